@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use prehend::refine::data::bop::{Dataset, ResultRow, read_results};
-use prehend::refine::data::{Assets, Sensor};
+use prehend::refine::data::Assets;
 use prehend::refine::evaluate::Scorer;
 use prehend::refine::evaluate::metrics::PoseScore;
 use prehend::refine::{Method, PreparedFrame, refine};
@@ -21,7 +21,7 @@ fn before_and_after(dataset: &Path, poses: &str) -> (usize, [f64; 3], [f64; 3]) 
         let object = assets.object(row.obj_id).expect("the model loads");
         let frame = data.frame(row.scene_id, row.im_id).expect("the frame is listed");
         let observation =
-            assets.observation(&frame, 0, &Sensor::required_by(&method)).expect("the frame loads");
+            assets.observation(&frame, 0, method.gradients()).expect("the frame loads");
         let frame = PreparedFrame::new(&observation, &object).expect("the frame fits");
         let refined = refine(&frame, &row.t_cam_model, &method).expect("the frame refines");
         let refined = ResultRow { t_cam_model: *refined.t_cam_object(), ..row.clone() };

@@ -64,12 +64,12 @@ mod workers;
 /// Millimeters in a meter, for what is told to people and written to BOP files.
 pub(crate) const MM_PER_M: f64 = 1e3;
 
-pub use error::{Panicked, RefineError, guard};
+pub use error::{RefineError, SettingsError, guard};
 pub use estimator::{Estimator, EstimatorInput, RefineJob, Refined, refine_all};
 pub use method::Method;
 pub use pose_finder::{Hypotheses, PoseCandidate, PoseFinder};
 pub use problem::{Factor, State};
 pub use scene::{Frame, Hand, HandMeasurement, Object, PreparedFrame};
-pub use settings::{Settings, SettingsError};
+pub use settings::Settings;
 pub use strategy::{Estimate, Strategy, refine};
 pub use workers::Workers;

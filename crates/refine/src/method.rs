@@ -57,6 +57,14 @@ impl Method {
         }
     }
 
+    /// Gradients that are combined, each with evidence without which it cannot begin; none but of a [`Heuristic`].
+    pub fn gradients(&self) -> &[GradientKind] {
+        match self {
+            Self::Heuristic(heuristic) => &heuristic.gradients,
+            Self::Fused(_) | Self::Icp(_) => &[],
+        }
+    }
+
     fn strategy(&self) -> &dyn Strategy {
         match self {
             Self::Fused(fused) => fused.as_ref(),

@@ -7,22 +7,18 @@ use prehend_render::{Camera, DepthImage};
 
 use super::matcher::{Matcher, PointPair};
 use super::wide;
+use crate::defaults::settings;
 use crate::error::RefineError;
 use crate::problem::{Factor, NoiseModel, Rows, State};
 use crate::scene::PreparedFrame;
 
-/// Settings of [`ChamferDepthFactor`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct ChamferDepthSettings {
-    /// Depth points used at most, spread evenly over the mask.
-    pub points: usize,
-    /// Distances of points from the surface \[m\]. The two directions have half of the effective samples each.
-    pub noise: NoiseModel,
-}
-
-impl Default for ChamferDepthSettings {
-    fn default() -> Self {
-        Self { points: 1500, noise: wide(1.5e-3, 10e-3, 200.0) }
+settings! {
+    /// Settings of [`ChamferDepthFactor`].
+    pub struct ChamferDepthSettings {
+        /// Depth points used at most, spread evenly over the mask.
+        pub points: usize = 1500,
+        /// Distances of points from the surface \[m\]. The two directions have half of the effective samples each.
+        pub noise: NoiseModel = wide(1.5e-3, 10e-3, 200.0),
     }
 }
 

@@ -20,7 +20,7 @@ use crate::strategy::{Estimate, Iteration, Observer, Recorder, Strategy};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Icp {
     /// Matches, and the distances of theirs that count.
-    pub metric: IcpMetric,
+    pub(crate) metric: IcpMetric,
     /// Iterations at most.
     pub iterations: usize,
     /// Depth points used at most, spread evenly over the mask.
@@ -35,7 +35,7 @@ pub struct Icp {
 
 /// Matches of an [`Icp`], and the distances of theirs that count.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum IcpMetric {
+pub(crate) enum IcpMetric {
     /// Mean squared distance of points (Besl and McKay, 1992), matched both ways, as the paper's Eq. 2 does: every depth point with the closest point
     /// of the surface, and every one of the object's surface samples, which stand for Eq. 2's triangles, with the closest depth point. Both ways count
     /// the same.

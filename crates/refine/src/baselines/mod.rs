@@ -10,7 +10,8 @@ mod step;
 
 pub use self::chamfer_depth::{ChamferDepthFactor, ChamferDepthSettings};
 pub use self::heuristic::{GradientKind, Heuristic};
-pub use self::icp::{Icp, IcpMetric};
+pub use self::icp::Icp;
+pub(crate) use self::icp::IcpMetric;
 pub use self::stability::{StabilityFactor, StabilitySettings};
 
 use prehend_geometry::RobustKernel;

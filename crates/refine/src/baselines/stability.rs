@@ -11,52 +11,36 @@ use prehend_sim::{
 };
 
 use super::stability_loss::{StabilityLoss, weights_relative_to_fall};
+use crate::defaults::settings;
 use crate::error::RefineError;
 use crate::problem::{Block, Factor, NormalEquations, State};
 use crate::scene::{PreparedFrame, check_gravity};
 
-/// Settings of the stability factor.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StabilitySettings {
-    /// Nats per unit of ln(1 + L_DP), where L_DP is 1 for an object in free fall.
-    pub weight: f64,
-    /// Standard deviation of the object's displacement from the initial pose \[m\]: λ = 1/(2σ²).
-    pub displacement_sigma: f64,
-    /// Depth to which the object's weight presses it in \[m\]; sets the contact stiffness.
-    pub penetration: f64,
-    /// Area that is assumed to carry the weight \[m²\]; sets the contact stiffness.
-    pub contact_area: f64,
-    /// Damping ratio of the contact.
-    pub damping_ratio: f64,
-    /// Coefficient of friction.
-    pub friction: f64,
-    /// Slip speed that regularizes friction \[m/s\].
-    pub slip_scale: f64,
-    /// Length of a rollout \[s\].
-    pub time: f64,
-    /// Steps of a rollout at least, and at most where stiff contact needs shorter ones.
-    pub steps: (usize, usize),
-    /// Speed of the perturbed starts \[m/s\].
-    pub perturbation: f64,
-    /// Derivative of contacts not yet made, and the distance up to which they are felt \[m\].
-    pub leak: (f64, f64),
-}
-
-impl Default for StabilitySettings {
-    fn default() -> Self {
-        Self {
-            weight: 4.0,
-            displacement_sigma: 0.05,
-            penetration: 1e-3,
-            contact_area: 2e-3,
-            damping_ratio: 0.2,
-            friction: 0.5,
-            slip_scale: 5e-2,
-            time: 10e-3,
-            steps: (20, 200),
-            perturbation: 0.01,
-            leak: (0.1, 2e-3),
-        }
+settings! {
+    /// Settings of the stability factor.
+    pub struct StabilitySettings {
+        /// Nats per unit of ln(1 + L_DP), where L_DP is 1 for an object in free fall.
+        pub weight: f64 = 4.0,
+        /// Standard deviation of the object's displacement from the initial pose \[m\]: λ = 1/(2σ²).
+        pub displacement_sigma: f64 = 0.05,
+        /// Depth to which the object's weight presses it in \[m\]; sets the contact stiffness.
+        pub penetration: f64 = 1e-3,
+        /// Area that is assumed to carry the weight \[m²\]; sets the contact stiffness.
+        pub contact_area: f64 = 2e-3,
+        /// Damping ratio of the contact.
+        pub damping_ratio: f64 = 0.2,
+        /// Coefficient of friction.
+        pub friction: f64 = 0.5,
+        /// Slip speed that regularizes friction \[m/s\].
+        pub slip_scale: f64 = 5e-2,
+        /// Length of a rollout \[s\].
+        pub time: f64 = 10e-3,
+        /// Steps of a rollout at least, and at most where stiff contact needs shorter ones.
+        pub steps: (usize, usize) = (20, 200),
+        /// Speed of the perturbed starts \[m/s\].
+        pub perturbation: f64 = 0.01,
+        /// Derivative of contacts not yet made, and the distance up to which they are felt \[m\].
+        pub leak: (f64, f64) = (0.1, 2e-3),
     }
 }
 

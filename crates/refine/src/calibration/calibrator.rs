@@ -83,7 +83,7 @@ impl Calibrator {
         let mut rig = Rig::nominal(joints, warp, &sigmas, settings.play);
         let mut models = BTreeMap::new();
         for (id, given) in objects {
-            let deviation = SurfaceDeviation::new(&given, &settings.fused.settings.patches);
+            let deviation = SurfaceDeviation::new(&given, &settings.fused.patches);
             rig.objects.extend(deviation.map(|deviation| (id, deviation)));
             models.insert(id, CalibrationModel { corrected: Arc::clone(&given), given });
         }
@@ -154,7 +154,7 @@ impl Calibrator {
     /// Observation of a frame corrected by the rig, and the strategy that refines it.
     fn corrected(&self, frame: &CalibrationFrame) -> Result<(Frame, Fused), RefineError> {
         let CalibrationFrame { frame: observation, obj_id, initial, .. } = frame;
-        let (object, mut fused) = (self.object(*obj_id)?, self.settings.fused.clone());
+        let (object, mut fused) = (self.object(*obj_id)?, Fused::new(self.settings.fused.clone()));
         let mut observation = self.rig.corrected(observation)?;
         if observation.mask.count() == 0 {
             observation.mask = View::of_observation(&observation, object, initial)?.likely_mask();

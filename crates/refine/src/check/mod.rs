@@ -1,5 +1,5 @@
 //! Checks of inputs before any refinement, each with a figure and a likely cause: [`Warning`]s of single frames by limits of units, frames and sensors
-//! (`limits.rs` has them all), and mistakes by name, by trying over many frames which [`Correction`] makes the inputs agree with what is seen.
+//! (`limits.rs` has them all), and mistakes by name, by trying over many frames which correction ([`find_corrections`]) makes the inputs agree with what is seen.
 //!
 //! One cause should make one warning: what a hand, a mesh or depth is needed for is not judged if that is at fault itself.
 
@@ -20,10 +20,11 @@ use nalgebra::{Isometry3, Translation3};
 use prehend_render::{Camera, DepthImage};
 
 pub use self::correction::{
-    Correction, CorrectionSettings, CorrectionTrial, FieldNames, Finding, find_corrections,
+    CorrectionSettings, CorrectionTrial, FieldNames, Finding, find_corrections,
 };
 pub(crate) use self::model::{check as check_object, likely_unit};
-pub use self::warning::{Subject, Warning};
+pub(crate) use self::warning::Subject;
+pub use self::warning::Warning;
 use crate::scene::{Frame, HandMeasurement, IntrinsicsMistake, Object, Pixel, View};
 use crate::strategy::FitSettings;
 

@@ -4,7 +4,7 @@ use std::fmt;
 
 /// Subject of a [`Warning`]: the most likely fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Subject {
+pub(crate) enum Subject {
     /// The object's mesh, its size against the dataset's, and its mass.
     Model,
     /// The unit of the object's mesh.
@@ -29,7 +29,7 @@ pub enum Subject {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {
     /// Most likely fault.
-    pub subject: Subject,
+    pub(crate) subject: Subject,
     /// Finding with all figures, and the likely cause where there is one.
     pub message: String,
 }

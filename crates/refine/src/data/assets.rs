@@ -9,10 +9,11 @@ use prehend_geometry::{GridCache, TriMesh};
 use crate::baselines::GradientKind;
 use crate::data::bop::{
     Body, BodyKind, Dataset, DatasetError, DatasetImage, Models, Origin, ResultRow, SceneBodies,
+    present,
 };
 use crate::data::mask_source::{MaskSource, Sought};
 use crate::data::robots::{Robots, kept};
-use crate::error::{Panicked, RefineError};
+use crate::error::RefineError;
 use crate::estimator::Estimator;
 use crate::method::Method;
 use crate::rig::Rig;
@@ -50,9 +51,6 @@ pub enum AssetError {
     /// The refinement itself.
     #[error(transparent)]
     Refine(#[from] RefineError),
-    /// The program is at fault.
-    #[error(transparent)]
-    Panicked(#[from] Panicked),
     /// A frame is at fault.
     #[error("{target}: {error}")]
     Frame {
@@ -61,28 +59,6 @@ pub enum AssetError {
         /// Reason why the frame cannot be read.
         error: Box<AssetError>,
     },
-}
-
-/// Measurement of a frame beside color, depth and mask, in a file of its own.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sensor {
-    /// Pose and joints of the hand, and gravity: `scene_bodies.json`.
-    Hand,
-    /// Taxel forces, which need the hand: `scene_tactile.json`.
-    Touch,
-}
-
-impl Sensor {
-    /// The sensors without which a refinement by `method` cannot begin.
-    pub fn required_by(method: &Method) -> Vec<Self> {
-        let Method::Heuristic(heuristic) = method else { return Vec::new() };
-        let sensor = |gradient: &GradientKind| match gradient {
-            GradientKind::Physics => Some(Self::Hand),
-            GradientKind::Tactile => Some(Self::Touch),
-            GradientKind::Rendering | GradientKind::Depth => None,
-        };
-        heuristic.gradients.iter().filter_map(sensor).collect()
-    }
 }
 
 /// The objects and hands of a dataset.
@@ -184,7 +160,7 @@ impl Assets {
         &mut self,
         target: &Target,
         t_cam_object: Option<&Isometry3<f64>>,
-        required: &[Sensor],
+        required: &[GradientKind],
     ) -> Result<FrameInput, AssetError> {
         let object = self.object(target.obj_id)?;
         let dataset = self.dataset.clone();
@@ -194,8 +170,8 @@ impl Assets {
         Ok(FrameInput { frame: self.corrected(stated)?, object, rig: self.rig.clone() })
     }
 
-    /// The frame with every sensor that it brings. A sensor whose file or
-    /// entry is absent is left out, unless it is in `required`.
+    /// The frame with all that it brings. A file or entry of the hand or its taxels that is absent is left out, unless a gradient of `required` needs it: that
+    /// of physics the hand and gravity, the tactile one the hand and its forces.
     ///
     /// # Errors
     /// If a file that is there is broken, or a required one is missing.
@@ -203,7 +179,7 @@ impl Assets {
         &mut self,
         image: &DatasetImage<'_>,
         instance: usize,
-        required: &[Sensor],
+        required: &[GradientKind],
     ) -> Result<Frame, AssetError> {
         let stated = self.stated(image, instance, None, required)?;
         self.corrected(stated)
@@ -223,7 +199,7 @@ impl Assets {
         frame: &DatasetImage<'_>,
         number: usize,
         sought: Option<&Sought<'_>>,
-        required: &[Sensor],
+        required: &[GradientKind],
     ) -> Result<Frame, AssetError> {
         let mut observation = frame.unsegmented()?;
         let (number, segmented) = match sought {
@@ -243,8 +219,12 @@ impl Assets {
                 observation = observation.with_view(view, t_cam_view);
             }
         }
-        let stated = present(frame.bodies(), !required.is_empty())?;
-        let SceneBodies { gravity, mut bodies } = stated.unwrap_or_default();
+        let needs = |gradient| required.contains(&gradient);
+        let needs_hand = needs(GradientKind::Physics) || needs(GradientKind::Tactile);
+        let SceneBodies { gravity, mut bodies } = match needs_hand {
+            true => frame.bodies()?,
+            false => present(frame.bodies())?.unwrap_or_default(),
+        };
         if let Some(sought) = sought {
             let image = (sought.target.scene_id, sought.target.im_id);
             bodies.extend(self.neighbors.get(&image).into_iter().flatten().cloned());
@@ -254,9 +234,12 @@ impl Assets {
             return Ok(observation);
         }
         let origin = frame.bodies_entry();
-        let tactile = present(frame.tactile(), required.contains(&Sensor::Touch))?;
+        let tactile = match needs(GradientKind::Tactile) {
+            true => frame.tactile()?,
+            false => present(frame.tactile())?.unwrap_or_default(),
+        };
         gravity.iter().try_for_each(check_gravity).map_err(|e| origin.fault("gravity", e))?;
-        if gravity.is_none() && required.contains(&Sensor::Hand) {
+        if gravity.is_none() && needs(GradientKind::Physics) {
             return Err(origin.fault("gravity", "is missing").into());
         }
         observation.gravity = gravity;
@@ -265,22 +248,13 @@ impl Assets {
                 self.object(obj_id)?;
             }
         }
-        let tactile = tactile.unwrap_or_default();
         observation.hand =
             self.robots.combined(&bodies, &tactile, &self.objects, &origin, "force")?;
-        if observation.hand.is_none() && !required.is_empty() {
+        if observation.hand.is_none() && needs_hand {
             return Err(origin.fault("bodies", "expected one hand, found 0").into());
         }
         observation.place_views();
         Ok(observation)
-    }
-}
-
-/// Result of `read`; `None` where the file or its entry is missing and not `required`.
-fn present<T>(read: Result<T, DatasetError>, required: bool) -> Result<Option<T>, DatasetError> {
-    match read {
-        Err(DatasetError::Missing { .. }) if !required => Ok(None),
-        read => read.map(Some),
     }
 }
 
@@ -294,12 +268,8 @@ fn present<T>(read: Result<T, DatasetError>, required: bool) -> Result<Option<T>
 fn load_object(models: &Models, id: u32, seed: u64) -> Result<Object, AssetError> {
     let mesh = load_mesh(models, id)?;
     let name = models.mesh_path(id)?.display().to_string();
-    let info = match models.info(id) {
-        Ok(info) => Some(info),
-        // BOP does not require the list of an estimator's models.
-        Err(DatasetError::Missing { .. }) => None,
-        Err(broken) => return Err(broken.into()),
-    };
+    // BOP does not require the list of an estimator's models.
+    let info = present(models.info(id))?;
     let mass = info.as_ref().and_then(|info| info.mass);
     let place = info.as_ref().and_then(|info| info.center_of_mass.zip(info.inertia));
     let object = match mass.zip(place) {

@@ -7,9 +7,6 @@ use prehend_geometry::{ClosestPoints, SolidUnion, TriMesh, VolumeError, contact_
 /// Surface samples closer to the hand than this count as contact \[m\].
 const CONTACT_DISTANCE: f64 = 0.005;
 
-/// Surface samples the contact area is estimated from.
-pub const CONTACT_SAMPLES: usize = 100_000;
-
 /// An object prepared for measuring its contact in many poses.
 #[derive(Clone, Debug)]
 pub struct ContactModel {
@@ -19,10 +16,13 @@ pub struct ContactModel {
 }
 
 impl ContactModel {
-    /// Draws [`CONTACT_SAMPLES`] points of a mesh \[m\], the same on every call, and cleans the mesh for exact volumes.
+    /// Surface samples the contact area is estimated from.
+    pub const SAMPLES: usize = 100_000;
+
+    /// Draws [`SAMPLES`](Self::SAMPLES) points of a mesh \[m\], the same on every call, and cleans the mesh for exact volumes.
     pub fn new(mesh: &TriMesh) -> Self {
         let samples =
-            surface_samples(mesh, CONTACT_SAMPLES, 0).into_iter().map(|s| s.point).collect();
+            surface_samples(mesh, Self::SAMPLES, 0).into_iter().map(|s| s.point).collect();
         Self { samples, area: mesh.area(), solid: mesh.cleaned().0 }
     }
 

@@ -8,7 +8,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::data::bop::{Dataset, DatasetError, read_bytes};
+use crate::data::bop::{Dataset, DatasetError, present, read_bytes};
 
 /// Facts by name. Two runs with equal facts have equal results.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -83,7 +83,7 @@ pub fn file_fingerprint(file: &Path) -> Result<String, DatasetError> {
 /// JSON files of a scene that estimators read.
 pub const SENSED: [&str; 3] = ["scene_camera.json", "scene_bodies.json", "scene_tactile.json"];
 /// JSON files of a scene that only scoring reads.
-pub const TRUTH: [&str; 2] = ["scene_gt.json", "scene_bodies_gt.json"];
+pub(crate) const TRUTH: [&str; 2] = ["scene_gt.json", "scene_bodies_gt.json"];
 
 /// A fingerprint of the files of all scenes that are called as one of `names` ([`SENSED`], [`TRUTH`]), and of the models'
 /// `models_info.json`; not of pictures and meshes, which are many.
@@ -97,11 +97,7 @@ pub fn dataset_fingerprint(dataset: &Dataset, names: &[&str]) -> Result<String, 
     for file in scenes.chain([models]) {
         let name = file.strip_prefix(dataset.root()).unwrap_or(&file);
         hasher.write(name.to_string_lossy().as_bytes());
-        match read_bytes(&file) {
-            Ok(bytes) => hasher.write(&bytes),
-            Err(DatasetError::Missing { .. }) => hasher.write(b"absent"),
-            Err(error) => return Err(error),
-        }
+        hasher.write(present(read_bytes(&file))?.as_deref().unwrap_or(b"absent"));
     }
     Ok(format!("{:016x}", hasher.finish()))
 }

@@ -21,12 +21,12 @@ mod robots;
 mod targets;
 mod times;
 
-pub use assets::{AssetError, Assets, FrameInput, Sensor, load_mesh};
+pub use assets::{AssetError, Assets, FrameInput, load_mesh};
 pub use bop::pose_from_matrix;
 #[cfg(feature = "cli")]
 pub use cache::user_cache;
 pub use calibration::{Calibrated, CalibrationFrames};
-pub use contact::{CONTACT_SAMPLES, ContactModel};
+pub use contact::ContactModel;
 pub(crate) use frame_file::FrameParts;
 pub use frame_file::load_frame_file;
 pub use identity::Identity;

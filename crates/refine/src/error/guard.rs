@@ -2,29 +2,26 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// A part of the program panicked: a fault of its own, which the panic's message tells.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the program is at fault: {0}")]
-pub struct Panicked(String);
+use super::RefineError;
 
 /// Result of `work`, or its panic as an error, so that one frame fails and the others go on.
 ///
 /// State that `work` shares must stay valid if it panics midway. Caches do: only whole entries are added to them.
 ///
 /// # Errors
-/// Those of `work`, and [`Panicked`].
-pub fn guard<T, E: From<Panicked>>(work: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
+/// Those of `work`, and [`RefineError::Panicked`].
+pub fn guard<T, E: From<RefineError>>(work: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| {
         let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
         let text = text.or_else(|| payload.downcast_ref::<String>().cloned());
-        Err(Panicked(text.unwrap_or_else(|| "a panic without a message".to_owned())).into())
+        let text = text.unwrap_or_else(|| "a panic without a message".to_owned());
+        Err(RefineError::Panicked(text).into())
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::RefineError;
 
     #[test]
     fn a_panic_is_an_error_with_its_message() {

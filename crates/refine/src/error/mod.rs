@@ -1,12 +1,14 @@
 //! Why a refinement could not be done.
 
 mod guard;
+mod settings;
 
 use prehend_geometry::hand::TaxelError;
 use prehend_geometry::robot::RobotError;
 use thiserror::Error;
 
-pub use self::guard::{Panicked, guard};
+pub use self::guard::guard;
+pub use self::settings::SettingsError;
 
 /// Why a pose could not be refined.
 #[derive(Debug, Error)]
@@ -96,9 +98,9 @@ pub enum RefineError {
     /// A table of taxels cannot be read.
     #[error(transparent)]
     Taxels(#[from] TaxelError),
-    /// The program is at fault.
-    #[error(transparent)]
-    Panicked(#[from] Panicked),
+    /// A part of the program panicked: a fault of its own, which the panic's message tells.
+    #[error("the program is at fault: {0}")]
+    Panicked(String),
     /// The images of the observation do not fit each other, or their camera is impossible.
     #[error("the images of the observation cannot be used: {0}")]
     Images(String),

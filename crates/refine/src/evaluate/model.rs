@@ -4,22 +4,10 @@ use nalgebra::Isometry3;
 use prehend_geometry::cloud::diameter;
 use prehend_render::{Camera, DepthImage, ModelError, RenderModel, depth_map};
 
-use crate::data::bop::{DatasetError, ModelInfo, Models};
+use crate::data::bop::{Models, present};
 use crate::data::{AssetError, ContactModel, load_mesh};
 use crate::error::RefineError;
 use crate::evaluate::metrics::{NormalizedErrors, ScoredModel, VSD_TOLERANCES, vsd};
-
-/// Entry of an object in `models_info.json`, if there is one.
-///
-/// # Errors
-/// If the file is broken: without its symmetries, a symmetric object would be scored wrongly.
-pub(super) fn model_info(models: &Models, obj_id: u32) -> Result<Option<ModelInfo>, DatasetError> {
-    match models.info(obj_id) {
-        Ok(info) => Ok(Some(info)),
-        Err(DatasetError::Missing { .. }) => Ok(None),
-        Err(broken) => Err(broken),
-    }
-}
 
 /// An object to score poses of.
 pub(super) struct EvaluationModel {
@@ -37,10 +25,10 @@ impl EvaluationModel {
     /// symmetries, and the diameter of its vertices.
     ///
     /// # Errors
-    /// If `models_info.json` or the mesh is broken, or the latter cannot be rendered.
+    /// If `models_info.json` is broken (without its symmetries, a symmetric object would be scored wrongly), or the mesh, or it cannot be rendered.
     pub(super) fn new(models: &Models, obj_id: u32) -> Result<Self, AssetError> {
         let mesh = load_mesh(models, obj_id)?;
-        let (symmetries, diameter) = match model_info(models, obj_id)? {
+        let (symmetries, diameter) = match present(models.info(obj_id))? {
             Some(info) => (info.symmetries, info.diameter),
             None => (Default::default(), diameter(&mesh.vertices)),
         };

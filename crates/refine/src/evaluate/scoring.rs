@@ -8,8 +8,8 @@ use prehend_geometry::robot::KinematicTree;
 use prehend_geometry::{ClosestPoints, SolidUnion, TriMesh};
 use prehend_render::DepthImage;
 
-use super::model::{EvaluationModel, model_info};
-use crate::data::bop::{Dataset, DatasetError, GroundTruth, ResultRow};
+use super::model::EvaluationModel;
+use crate::data::bop::{Dataset, DatasetError, GroundTruth, ResultRow, present};
 use crate::data::{AssetError, ContactModel, load_robot};
 use crate::evaluate::metrics::{Contact, ScoredRow, oe_symmetric_deg, pe_cm};
 use crate::symmetry::Symmetries;
@@ -70,7 +70,7 @@ impl<'a> Scorer<'a> {
             Err(AssetError::Dataset(DatasetError::Missing { .. })) => return Ok(None),
             found => found?,
         };
-        let info = model_info(self.truth.models(), row.obj_id)?;
+        let info = present(self.truth.models().info(row.obj_id))?;
         let symmetries = info.map_or_else(Symmetries::default, |info| info.symmetries);
         let degrees = oe_symmetric_deg(&row.t_cam_model, &truth, &symmetries);
         Ok(Some([1e-2 * pe_cm(&row.t_cam_model, &truth), degrees.to_radians()]))
@@ -118,11 +118,7 @@ impl<'a> Scorer<'a> {
         if let Some(known) = self.image.take_if(|known| known.scene_and_image == (scene, image)) {
             return Ok(known);
         }
-        let depth = match self.dataset.frame(scene, image)?.depth() {
-            Ok(depth) => Some(depth),
-            Err(DatasetError::Missing { .. }) => None,
-            Err(broken) => return Err(broken),
-        };
+        let depth = present(self.dataset.frame(scene, image)?.depth())?;
         Ok(Image { scene_and_image: (scene, image), hand: None, depth })
     }
 

@@ -252,7 +252,7 @@ struct NetworkSource {
 
 impl NetworkSource {
     fn fault(&self, name: &str, problem: String) -> NetworkError {
-        NetworkError::Tensor { file: self.file.clone(), name: name.to_owned(), problem }
+        NetworkError::new(&self.file, format!("tensor {name}: {problem}"))
     }
 
     /// The tensor of that name, with these dimensions where they are known.

@@ -5,7 +5,7 @@ use prehend_geometry::KdTree;
 use prehend_geometry::cloud::estimate_normals;
 
 use crate::error::RefineError;
-use crate::scene::{HandMeasurement, PreparedFrame, TouchReading};
+use crate::scene::{HandMeasurement, PreparedFrame, TouchReading, median};
 
 /// Number of [input channels](super) of a point.
 pub const CHANNELS: usize = 15;
@@ -57,7 +57,8 @@ impl SensedPoints {
         let place =
             |&(x, y, z): &(usize, usize, f64)| observation.camera.unproject(x as f64, y as f64, z);
         let mut places: Vec<Point3<f64>> = depths.iter().map(place).collect();
-        let middle = median(&places);
+        let middle = |axis| median(places.iter().map(|p| p[axis])).unwrap_or(0.0);
+        let middle = Point3::new(middle(0), middle(1), middle(2));
         let is_near = |p: &Point3<f64>| (p - middle).norm() <= REACH * radius;
         let colored = observation.has_colors();
         let color =
@@ -118,16 +119,6 @@ fn touched(reading: &HandMeasurement) -> Result<Vec<SensedPoint>, RefineError> {
         }
     }
     Ok(felt)
-}
-
-/// Median of each coordinate; the origin without points.
-fn median(points: &[Point3<f64>]) -> Point3<f64> {
-    let middle = |axis: usize| {
-        let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
-        let at = values.len() / 2;
-        if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(at, f64::total_cmp).1 }
-    };
-    Point3::new(middle(0), middle(1), middle(2))
 }
 
 /// The network's coordinates: origin in the middle of the points that were seen, z along the line of sight to it, lengths in radii of the object.

@@ -22,33 +22,18 @@ pub type Tensors = BTreeMap<String, Tensor>;
 
 /// Reason that a network cannot be read or written.
 #[derive(Debug, Error)]
-pub enum NetworkError {
-    /// The file cannot be read or written.
-    #[error("{}: {reason}", file.display())]
-    File {
-        /// File.
-        file: PathBuf,
-        /// Error of the operating system.
-        reason: std::io::Error,
-    },
-    /// The file is not in the format safetensors.
-    #[error("{}: no safetensors file: {problem}", file.display())]
-    Format {
-        /// File.
-        file: PathBuf,
-        /// Fault.
-        problem: String,
-    },
-    /// A tensor is missing or not what it should be.
-    #[error("{}: tensor {name}: {problem}", file.display())]
-    Tensor {
-        /// File.
-        file: PathBuf,
-        /// Name of the tensor.
-        name: String,
-        /// Fault.
-        problem: String,
-    },
+#[error("{}: {problem}", file.display())]
+pub struct NetworkError {
+    /// File.
+    pub file: PathBuf,
+    /// Fault, after the name of the tensor if one is at fault.
+    pub problem: String,
+}
+
+impl NetworkError {
+    pub(super) fn new(file: &Path, problem: impl ToString) -> Self {
+        Self { file: file.to_owned(), problem: problem.to_string() }
+    }
 }
 
 /// Entry of the header.
@@ -68,9 +53,9 @@ const HEADER: usize = 1 << 24;
 /// # Errors
 /// [`NetworkError`] naming the file, and the tensor if one is at fault.
 pub fn read_tensors(file: &Path) -> Result<Tensors, NetworkError> {
-    let bytes = read_plain(file, LIMIT)
-        .map_err(|reason| NetworkError::File { file: file.to_owned(), reason })?;
-    let format = |problem: String| NetworkError::Format { file: file.to_owned(), problem };
+    let bytes = read_plain(file, LIMIT).map_err(|reason| NetworkError::new(file, reason))?;
+    let format =
+        |problem: String| NetworkError::new(file, format!("no safetensors file: {problem}"));
     let (length, rest) =
         bytes.split_first_chunk::<8>().ok_or_else(|| format("less than 8 bytes".into()))?;
     let length = usize::try_from(u64::from_le_bytes(*length)).unwrap_or(usize::MAX);
@@ -83,7 +68,7 @@ pub fn read_tensors(file: &Path) -> Result<Tensors, NetworkError> {
     let entries = header.into_iter().filter(|(name, _)| name != "__metadata__");
     let read = |(name, entry): (String, Value)| match values(entry, data) {
         Ok(tensor) => Ok((name, tensor)),
-        Err(problem) => Err(NetworkError::Tensor { file: file.to_owned(), name, problem }),
+        Err(problem) => Err(NetworkError::new(file, format!("tensor {name}: {problem}"))),
     };
     entries.map(read).collect()
 }
@@ -109,7 +94,7 @@ fn values(entry: Value, data: &[u8]) -> Result<Tensor, String> {
 /// Writes `tensors` to a file, whole or not at all.
 ///
 /// # Errors
-/// [`NetworkError::File`].
+/// [`NetworkError`] if the file cannot be written.
 pub fn write_tensors(file: &Path, tensors: &Tensors) -> Result<(), NetworkError> {
     let (mut header, mut data) = (BTreeMap::new(), Vec::new());
     for (name, tensor) in tensors {
@@ -121,10 +106,10 @@ pub fn write_tensors(file: &Path, tensors: &Tensors) -> Result<(), NetworkError>
             TensorEntry { dtype: "F32".into(), shape: tensor.shape.clone(), data_offsets },
         );
     }
-    let fault = |reason| NetworkError::File { file: file.to_owned(), reason };
-    let mut header = serde_json::to_vec(&header).map_err(|e| fault(e.into()))?;
+    let mut header = serde_json::to_vec(&header).map_err(|e| NetworkError::new(file, e))?;
     // Numbers begin at a multiple of eight bytes, as the format has it.
     header.resize(header.len().next_multiple_of(8), b' ');
     let length = (header.len() as u64).to_le_bytes();
-    write_atomic(file, &[&length, header.as_slice(), &data].concat()).map_err(fault)
+    write_atomic(file, &[&length, header.as_slice(), &data].concat())
+        .map_err(|reason| NetworkError::new(file, reason))
 }

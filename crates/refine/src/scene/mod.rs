@@ -23,9 +23,11 @@ pub(crate) use gaussian_process::{InducingPoints, farthest_points, squared_expon
 pub use hand::Hand;
 pub(crate) use hand::prismatic_joints;
 pub(crate) use intrinsics::IntrinsicsMistake;
-pub use object::{Inertial, Object, StatedSize};
-pub use prepared_frame::{CameraView, Occluders, PreparedFrame};
+pub(crate) use object::StatedSize;
+pub use object::{Inertial, Object};
+pub(crate) use prepared_frame::CameraView;
 pub(crate) use prepared_frame::{MASK_MARGIN, draw_hand_depth, eroded, hand_depth};
+pub use prepared_frame::{Occluders, PreparedFrame};
 pub use region::ForegroundSettings;
 pub(crate) use region::{
     ColorRatios, MaskBorder, RegionColors, RegionEvidence, color_index, pixel_distances,

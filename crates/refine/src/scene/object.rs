@@ -33,7 +33,7 @@ pub struct Inertial {
 
 /// How large whoever made a model says that it is, in object coordinates.
 #[derive(Clone, Debug, PartialEq)]
-pub struct StatedSize {
+pub(crate) struct StatedSize {
     /// Largest distance between two vertices \[m\].
     pub diameter: f64,
     /// Lowest and highest coordinates of vertices \[m\], where they are stated.
@@ -56,7 +56,7 @@ pub struct Object {
     /// Whether `inertial` was assumed (uniform 500 kg/m³) rather than given.
     pub inertial_assumed: bool,
     /// How large the mesh should be, where that is stated; it is checked and has no other effect.
-    pub stated_size: Option<StatedSize>,
+    pub(crate) stated_size: Option<StatedSize>,
     /// Center of the bounding box, in object coordinates \[m\].
     pub center: Point3<f64>,
     /// Half the diagonal of the bounding box \[m\]: turns radians into meters of surface motion.

@@ -36,7 +36,7 @@ pub struct PreparedFrame<'a> {
 }
 
 /// View of another camera.
-pub struct CameraView<'a> {
+pub(crate) struct CameraView<'a> {
     /// Which of the observation's [`views`](Frame::views) it is.
     pub index: usize,
     /// The first camera's coordinates → its own \[m\].
@@ -146,7 +146,7 @@ impl<'a> PreparedFrame<'a> {
     }
 
     /// Views of other cameras that have a mask of the object.
-    pub fn views(&self) -> &[CameraView<'a>] {
+    pub(crate) fn views(&self) -> &[CameraView<'a>] {
         &self.views
     }
 

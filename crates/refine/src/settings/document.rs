@@ -7,7 +7,8 @@ use schemars::schema_for;
 use serde_json::Value as Json;
 use toml::Value;
 
-use super::{Settings, SettingsError};
+use super::Settings;
+use crate::error::SettingsError;
 
 /// Columns of a comment.
 const WIDTH: usize = 110;

@@ -4,7 +4,7 @@
 mod document;
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use prehend_geometry::limits::MAX_TEXT_BYTES;
 use prehend_geometry::read_plain;
@@ -14,9 +14,10 @@ use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
 use crate::calibration::CalibratorSettings;
+use crate::error::SettingsError;
 use crate::network::NetworkSettings;
 use crate::search::SearchSettings;
-use crate::strategy::{Fused, FusedSettings};
+use crate::strategy::FusedSettings;
 use crate::tracker::TrackerSettings;
 
 /// Settings of estimator, search, networks, tracker and calibration: what the command's `--settings FILE` and `--set PATH=VALUE` change, and Python's `settings`.
@@ -45,34 +46,6 @@ pub struct Settings {
     pub tracker: TrackerSettings,
     /// The calibration of a rig from its frames.
     pub calibration: CalibratorSettings,
-}
-
-/// Why settings are not taken.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SettingsError {
-    /// The file cannot be read, or is wrong.
-    #[error("{}: {source}", file.display())]
-    File {
-        /// The file.
-        file: PathBuf,
-        /// Error of the system or of the content.
-        source: Box<dyn Error + Send + Sync>,
-    },
-    /// It is no TOML, there is no such setting, or it cannot have this value.
-    #[error("{place}: {problem}")]
-    Value {
-        /// Path of the setting, such as `estimator.patches.sigma`; line of a file that is no TOML.
-        place: String,
-        /// Problem.
-        problem: String,
-    },
-}
-
-impl SettingsError {
-    fn value(place: impl Into<String>, problem: impl ToString) -> Self {
-        Self::Value { place: place.into(), problem: problem.to_string().trim_end().to_owned() }
-    }
 }
 
 impl Settings {
@@ -146,7 +119,7 @@ impl Settings {
 
     /// Settings of the calibration, with those of the estimator that refines its frames.
     pub fn calibration(&self) -> CalibratorSettings {
-        CalibratorSettings { fused: Fused::new(self.estimator.clone()), ..self.calibration.clone() }
+        CalibratorSettings { fused: self.estimator.clone(), ..self.calibration.clone() }
     }
 }
 

@@ -7,24 +7,20 @@ use prehend_geometry::sample::surface_samples;
 use prehend_geometry::{SurfaceSample, TriMesh};
 
 use super::paint::Paint;
+use crate::defaults::settings;
 
-/// Tolerances of symmetries.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SymmetrySettings {
-    /// Largest distance of the surface from where the symmetry has it, as a fraction of the diameter.
-    pub tolerance: f64,
-    /// The fraction of the surface that may lie farther off: dents and tabs of real objects.
-    pub exempt: f64,
-    /// Largest difference of the surface's mean color (0..=1, each patch blurred to the size of the tolerance), root
-    /// mean square; `None` looks at the shape alone.
-    pub color_tolerance: Option<f64>,
-    /// Points of the surface that are compared.
-    pub samples: usize,
-}
-
-impl Default for SymmetrySettings {
-    fn default() -> Self {
-        Self { tolerance: 0.025, exempt: 0.01, color_tolerance: None, samples: 1000 }
+settings! {
+    /// Tolerances of symmetries.
+    pub struct SymmetrySettings {
+        /// Largest distance of the surface from where the symmetry has it, as a fraction of the diameter.
+        pub tolerance: f64 = 0.025,
+        /// The fraction of the surface that may lie farther off: dents and tabs of real objects.
+        pub exempt: f64 = 0.01,
+        /// Largest difference of the surface's mean color (0..=1, each patch blurred to the size of the tolerance), root
+        /// mean square; `None` looks at the shape alone.
+        pub color_tolerance: Option<f64> = None,
+        /// Points of the surface that are compared.
+        pub samples: usize = 1000,
     }
 }
 

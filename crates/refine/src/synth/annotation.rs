@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::files::Shot;
 use super::hand_files::{TAXELS, URDF};
-use crate::data::bop::{UNITS_PER_NEWTON, extent_to_bop, rotation_to_row_major, translation_to_mm};
+use crate::data::bop::{Tactile, extent_to_bop, rotation_to_row_major, translation_to_mm};
 use crate::scene::Inertial;
 
 /// Millimeters of one unit of the depth images.
@@ -75,7 +75,7 @@ pub(super) fn lens(lens: &Distortion) -> Value {
 fn touch(forces: &[Vector3<f64>]) -> Value {
     // Whole units are written without a fraction.
     let units = |f: f64| {
-        let units = (f * UNITS_PER_NEWTON).clamp(-FORCE_LIMIT, FORCE_LIMIT);
+        let units = (f * Tactile::UNITS_PER_NEWTON).clamp(-FORCE_LIMIT, FORCE_LIMIT);
         let whole = units.round();
         if (units - whole).abs() < 1e-9 { json!(whole as i64) } else { json!(units) }
     };

@@ -1,40 +1,37 @@
-//! Reason that a dataset could not be made.
-
-use std::path::PathBuf;
+//! Reason that a grasp or a dataset could not be made.
 
 use prehend_render::DistortionError;
+use prehend_sim::SimulationError;
 use thiserror::Error;
 
 use crate::data::AssetError;
-use crate::data::bop::DatasetError;
 
-/// Reason that a dataset could not be made.
+/// Reason that a grasp or a dataset could not be made.
 #[derive(Debug, Error)]
 pub enum SynthError {
-    /// The folder holds a dataset that was begun with other settings.
-    #[error("{}: {difference}: give the same settings, or another folder", file.display())]
-    OtherSettings {
-        /// File of the dataset's settings.
-        file: PathBuf,
-        /// The first setting that differs, and both its values.
-        difference: String,
-    },
-    /// This folder holds something else.
-    #[error("{}: is not empty and has no synth.json: no dataset of ours to go on with", .0.display())]
-    Occupied(PathBuf),
-    /// There are no objects, two have the same number, or one cannot be used in this hand at all.
+    /// An argument or setting that is out of its range, a folder that holds something else, a hand or an object that cannot be used, or an attempt that
+    /// led to no grasp within the settings: another seed may do better.
     #[error("{0}")]
-    Argument(String),
+    Refused(String),
+    /// The simulation failed.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
     /// The lens cannot make an image.
     #[error(transparent)]
     Lens(#[from] DistortionError),
-    /// A file cannot be read or written, or an object prepared.
+    /// A file cannot be read or written, or an object or a hand prepared.
     #[error(transparent)]
-    Asset(#[from] AssetError),
+    Asset(AssetError),
 }
 
-impl From<DatasetError> for SynthError {
-    fn from(error: DatasetError) -> Self {
+impl<E: Into<AssetError>> From<E> for SynthError {
+    fn from(error: E) -> Self {
         Self::Asset(error.into())
+    }
+}
+
+impl SynthError {
+    pub(super) fn refused(problem: impl ToString) -> Self {
+        Self::Refused(problem.to_string())
     }
 }

@@ -7,12 +7,11 @@ use std::path::Path;
 use nalgebra::Isometry3;
 use prehend_geometry::TriMesh;
 use prehend_render::{Distortion, Mask};
-use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
 use super::annotation::{self, ImageEntries};
 use crate::data::AssetError;
-use crate::data::bop::{self, DatasetError, create_folder, write_atomically};
+use crate::data::bop::{DatasetError, create_folder, write_atomically};
 use crate::scene::{Frame, Inertial};
 
 /// Removes what was being written in the folder and below when a process ended: such files are hidden and end in `.tmp`.
@@ -29,14 +28,6 @@ pub(super) fn remove_temporary(folder: &Path) -> Result<(), DatasetError> {
         }
     }
     Ok(())
-}
-
-/// Content of a JSON file, if it is there.
-pub(super) fn read_json<T: DeserializeOwned>(file: &Path) -> Result<Option<T>, DatasetError> {
-    match bop::read_json(file) {
-        Err(DatasetError::Missing { .. }) => Ok(None),
-        read => read.map(Some),
-    }
 }
 
 /// The folders of a scene.

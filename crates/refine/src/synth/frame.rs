@@ -23,9 +23,8 @@ pub fn simulate_frame(
     moment: &GraspSnapshot,
     seed: u64,
 ) -> Result<(Frame, Isometry3<f64>), SynthError> {
-    let wrong = |error: &dyn std::fmt::Display| SynthError::Argument(error.to_string());
-    hand.check_joints(&moment.joints).map_err(|error| wrong(&error))?;
-    hand.check_forces(&moment.taxel_forces).map_err(|error| wrong(&error))?;
+    hand.check_joints(&moment.joints)?;
+    hand.check_forces(&moment.taxel_forces)?;
     let mut noise = SplitMix64::new(seed);
     let rig = SensorRig::new(settings, object, hand, None, &mut noise);
     let shot = rig.capture(moment, None, &mut noise)?;

@@ -11,17 +11,15 @@ use serde_json::json;
 
 use super::annotation::ImageEntries;
 use super::error::SynthError;
-use super::files::{
-    FRAME_FOLDERS, NAMES, read_json, remove_temporary, write_entries, write_models,
-};
+use super::files::{FRAME_FOLDERS, NAMES, remove_temporary, write_entries, write_models};
 use super::grasp::GraspSnapshot;
 use super::hand_files::HandFiles;
 use super::plan::{FrameUse, SynthObject, SynthSettings, check_plan, seed, sequence};
 use super::pose_noise::NoiseLevel;
 use super::sensor::{SensorRig, SimulatedLens};
 use crate::data::bop::{
-    Dataset, DatasetError, GroundTruth, ResultRow, create_folder, lock, write_atomically,
-    write_results,
+    Dataset, DatasetError, GroundTruth, ResultRow, create_folder, lock, present, read_json,
+    write_atomically, write_results,
 };
 use crate::data::{Identity, Journal};
 
@@ -127,8 +125,8 @@ where
 fn check(subjects: &[SynthObject]) -> Result<(), SynthError> {
     let mut ids = BTreeSet::new();
     match subjects.iter().find(|s| !ids.insert(s.obj_id)) {
-        Some(s) => Err(SynthError::Argument(format!("two objects have the number {}", s.obj_id))),
-        None if ids.is_empty() => Err(SynthError::Argument("there are no objects".into())),
+        Some(s) => Err(SynthError::Refused(format!("two objects have the number {}", s.obj_id))),
+        None if ids.is_empty() => Err(SynthError::Refused("there are no objects".into())),
         None => Ok(()),
     }
 }
@@ -156,7 +154,7 @@ impl SceneJob<'_> {
         let frames = self.settings.frames.get();
         if !journal.exists() && NAMES.iter().any(|name| self.dir.join(name).exists()) {
             (self.progress)(u64::from(frames));
-            return Ok(read_json(&failures)?.unwrap_or_default());
+            return Ok(present(read_json(&failures))?.unwrap_or_default());
         }
         for folder in FRAME_FOLDERS {
             create_folder(&self.dir.join(folder))?;
@@ -174,7 +172,7 @@ impl SceneJob<'_> {
         let mut failed = Vec::new();
         if !missing.is_empty() {
             let source = prepare()
-                .map_err(|reason| SynthError::Argument(format!("object {obj_id}: {reason}")))?;
+                .map_err(|reason| SynthError::Refused(format!("object {obj_id}: {reason}")))?;
             let attempt = |(grasp, images): (u32, Vec<u32>)| match self.moments(&source, grasp) {
                 Ok(moments) => self.frames(&moments, grasp, &images, &state).map(|()| None),
                 Err(reason) => {

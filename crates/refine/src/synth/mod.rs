@@ -20,7 +20,7 @@ pub use dataset::write_dataset;
 pub use error::SynthError;
 pub use frame::simulate_frame;
 pub use generate::{DatasetSummary, GraspFailure, generate};
-pub use grasp::{Grasp, GraspError, GraspSettings, GraspSnapshot, Grasper};
+pub use grasp::{Grasp, GraspSettings, GraspSnapshot, Grasper};
 pub use hand_files::HandFiles;
 pub use plan::{SynthObject, SynthSettings};
 pub use pose_noise::NoiseLevel;
@@ -28,4 +28,4 @@ pub use pose_noise::NoiseLevel;
 pub(crate) use pose_noise::random_direction;
 #[cfg(feature = "cli")]
 pub(crate) use sensor::smooth_field;
-pub use sensor::{FilmSettings, SensorSettings, SettingError};
+pub use sensor::{FilmSettings, SensorSettings};

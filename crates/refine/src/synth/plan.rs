@@ -11,10 +11,9 @@ use serde_json::{Map, Value, json};
 
 use super::annotation;
 use super::error::SynthError;
-use super::files::read_json;
 use super::hand_files::HandFiles;
 use super::sensor::{FilmSettings, SensorSettings};
-use crate::data::bop::{DatasetError, write_atomically};
+use crate::data::bop::{DatasetError, present, read_json, write_atomically};
 use crate::data::identity::{fingerprint, program};
 use crate::scene::Object;
 
@@ -62,7 +61,7 @@ impl SynthSettings {
 /// Writes the plan to `dir`, or makes sure that it is the one which is there.
 ///
 /// # Errors
-/// [`SynthError::OtherSettings`], [`SynthError::Occupied`], or when the file cannot be read or written.
+/// [`SynthError::Refused`] if other settings or other files are there; or when the file cannot be read or written.
 pub(super) fn check_plan(
     dir: &Path,
     hand: &HandFiles,
@@ -71,17 +70,23 @@ pub(super) fn check_plan(
 ) -> Result<(), SynthError> {
     let plan = describe(hand, subjects, settings);
     let file = dir.join("synth.json");
-    if let Some(stored) = read_json::<Value>(&file)? {
+    if let Some(stored) = present(read_json::<Value>(&file))? {
         return match difference(&stored, &plan, "") {
             None => Ok(()),
-            Some(difference) => Err(SynthError::OtherSettings { file, difference }),
+            Some(difference) => Err(SynthError::refused(format!(
+                "{}: {difference}: give the same settings, or another folder",
+                file.display()
+            ))),
         };
     }
     let mut entries = fs::read_dir(dir).map_err(|e| DatasetError::reading(dir, &e))?;
     // A run that ended before it had a plan may have left a temporary file.
     if entries.any(|e| e.is_ok_and(|e| !e.file_name().to_string_lossy().starts_with(".synth.json")))
     {
-        return Err(SynthError::Occupied(dir.to_owned()));
+        return Err(SynthError::refused(format!(
+            "{}: is not empty and has no synth.json: no dataset of ours to go on with",
+            dir.display()
+        )));
     }
     Ok(write_atomically(&file, format!("{plan:#}\n").as_bytes())?)
 }

@@ -11,7 +11,7 @@ use super::memory::{Prediction, TrackState};
 use super::pyramid::{LEVELS, PyramidLevel, pyramid};
 use super::sight::Sight;
 use crate::defaults::settings;
-use crate::scene::Object;
+use crate::scene::{Object, median};
 
 settings! {
     /// Settings of the alignment of images to a keyframe.
@@ -271,9 +271,8 @@ impl Normal {
         // About that of a normal distribution, by the median; then the maximum likelihood by fixed point iterations.
         let mut variance = before;
         if before.is_infinite() {
-            let mut sizes: Vec<f64> = rows.iter().map(|row| row.0.abs()).collect();
-            sizes.sort_by(f64::total_cmp);
-            variance = sizes.get(sizes.len() / 2).map_or(1.0, |median| (2.0 * median).powi(2));
+            let size = median(rows.iter().map(|row| row.0.abs()));
+            variance = size.map_or(1.0, |size| (2.0 * size).powi(2));
         }
         let KeyframeSettings { degrees, resolution, .. } = keyframe.settings;
         let least = f64::from(resolution as f32).powi(2);

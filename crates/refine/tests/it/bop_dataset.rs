@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use image::{ImageBuffer, Luma, Rgb};
 use nalgebra::{Isometry3, Vector3};
 use prehend_refine::data::bop::{
-    Dataset, DatasetError, GroundTruth, SceneBodies, Tactile, TactileReading, UNITS_PER_NEWTON,
+    Dataset, DatasetError, GroundTruth, SceneBodies, Tactile, TactileReading,
 };
 
 const R: &str = "[0, -1, 0, 1, 0, 0, 0, 0, 1]";
@@ -141,7 +141,7 @@ fn reads_everything_in_meters_and_newtons() {
     else {
         panic!("not one sensor of force")
     };
-    assert_eq!(force[1] * UNITS_PER_NEWTON, Vector3::new(100.0, -250.0, 10000.0));
+    assert_eq!(force[1] * Tactile::UNITS_PER_NEWTON, Vector3::new(100.0, -250.0, 10000.0));
     assert_eq!(*taxels, Some(fixture.root().join("hand/taxels.csv")));
     assert!(dataset.frame(4, 3).unwrap().rgb_path().unwrap().ends_with("rgb/000003.jpg"));
 }

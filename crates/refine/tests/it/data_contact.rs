@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::shapes::{capsule, cuboid};
 use prehend_geometry::{ClosestPoints, KinematicTree, SolidUnion, TriMesh};
 use prehend_refine::data::bop::{Dataset, GroundTruth, read_results};
-use prehend_refine::evaluate::metrics::{CONTACT_SAMPLES, ContactModel};
+use prehend_refine::evaluate::metrics::ContactModel;
 use serde_json::Value;
 
 use crate::data;
@@ -92,7 +92,8 @@ fn golden_contact_of_the_inhand_frames() {
             let (ca, expected) = (model.contact_area_cm2(&pose, &surface), golden("CA_cm2_eps5mm"));
             let area = 1e4 * mesh.area();
             let fraction = expected / area;
-            let sigma = area * (2.0 * fraction * (1.0 - fraction) / CONTACT_SAMPLES as f64).sqrt();
+            let sigma =
+                area * (2.0 * fraction * (1.0 - fraction) / ContactModel::SAMPLES as f64).sqrt();
             deviations.push((ca - expected) / sigma);
             assert!(
                 (ca - expected).abs() < 4.0 * sigma,

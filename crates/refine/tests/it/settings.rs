@@ -52,7 +52,7 @@ fn what_a_file_leaves_out_is_usual() {
     assert_eq!(settings.calibration.prior.joints, 0.01);
     let [search, tracker] = [settings.search().estimator, settings.tracker().search.estimator];
     assert_eq!([&search, &tracker, &settings.tracker().fused], [&expected; 3]);
-    assert_eq!(settings.calibration().fused.settings, expected);
+    assert_eq!(settings.calibration().fused, expected);
 }
 
 #[test]

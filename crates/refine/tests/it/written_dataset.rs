@@ -3,8 +3,9 @@
 use std::fs;
 
 use nalgebra::Isometry3;
+use prehend_refine::baselines::GradientKind;
+use prehend_refine::data::Assets;
 use prehend_refine::data::bop::{Dataset, GroundTruth, read_results};
-use prehend_refine::data::{Assets, Sensor};
 use prehend_refine::scene::default_scene;
 use prehend_refine::synth::write_dataset;
 use prehend_render::Mask;
@@ -22,7 +23,8 @@ fn what_is_written_reads_back() {
     let dataset = Dataset::open(dir.path()).unwrap();
     let mut assets = Assets::new(&dataset, 0);
     let frame = dataset.frame(1, 0).unwrap();
-    let seen = assets.observation(&frame, 0, &[Sensor::Hand, Sensor::Touch]).unwrap();
+    let seen =
+        assets.observation(&frame, 0, &[GradientKind::Physics, GradientKind::Tactile]).unwrap();
     let given = &scene.frame;
     assert_eq!((seen.camera, &seen.mask), (given.camera, &given.mask));
     assert!(seen.gravity.unwrap().metric_distance(&given.gravity.unwrap()) < 1e-12);

@@ -13,11 +13,11 @@ use crate::scene::{Target, median};
 #[derive(Clone, Debug)]
 pub struct Finding {
     /// Correction of the mistake.
-    pub correction: Correction,
+    pub(super) correction: Correction,
     /// Its factor.
     pub factor: f64,
     /// Correction that would do as well, with its factor.
-    pub alternative: Option<(Correction, f64)>,
+    pub(super) alternative: Option<(Correction, f64)>,
     /// Indices of the frames.
     pub frames: Vec<usize>,
     /// Mean agreement as the inputs are and with the correction, 0 to 1; none where it is the size that tells.

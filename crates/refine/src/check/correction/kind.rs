@@ -5,7 +5,7 @@ use strum::{EnumIter, EnumMessage, IntoEnumIterator};
 /// A mistake in a frame's inputs that has a name, by what corrects it. The documentation of each is its message, with the names of files and fields left open
 /// ([`FieldNames`]). Those that are more common come first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter, EnumMessage)]
-pub enum Correction {
+pub(super) enum Correction {
     /// {poses}: {t}: translations are in another unit; multiply {t} by {times}
     PoseUnit,
     /// {mesh}: the mesh is in another unit; multiply its vertices by {times}

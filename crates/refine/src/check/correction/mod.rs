@@ -17,7 +17,7 @@ mod tests;
 mod trial;
 
 pub use self::finding::{Finding, find_corrections};
-pub use self::kind::{Correction, FieldNames};
+pub use self::kind::FieldNames;
 pub use self::settings::CorrectionSettings;
 pub use self::trial::CorrectionTrial;
 pub(super) use self::trial::settled_pose;

@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use super::inputs::CheckInputs;
+use super::kind::Correction;
 use super::*;
 use crate::scene::Target;
 use crate::scene::{Object, Scene, default_scene};

@@ -9,9 +9,6 @@ use prehend_geometry::open_plain;
 
 use super::dataset::{Dataset, DatasetScene};
 
-/// Size \[bytes\] and modification time of a JSON file; `None` if they cannot be read.
-pub type Stamp = Option<(u64, SystemTime)>;
-
 /// Bytes at the end of a file in which its format says that it ends.
 const TAIL: usize = 12;
 
@@ -50,8 +47,9 @@ impl Dataset {
 }
 
 impl DatasetScene {
-    /// Stamps of its JSON files, which are read once: if they change, [`Dataset::reread`] is needed.
-    pub fn stamps(&self) -> [Stamp; 3] {
+    /// Size \[bytes\] and modification time of each of its JSON files, where they can be read. The files are read once: if these change,
+    /// [`Dataset::reread`] is needed.
+    pub fn stamps(&self) -> [Option<(u64, SystemTime)>; 3] {
         [&self.camera, &self.bodies, &self.tactile].map(|file| {
             let about = fs::metadata(file.path()).ok()?;
             Some((about.len(), about.modified().ok()?))

@@ -81,6 +81,14 @@ impl DatasetError {
     }
 }
 
+/// Result of `read`, if its file and entry are there.
+pub(crate) fn present<T>(read: Result<T, DatasetError>) -> Result<Option<T>, DatasetError> {
+    match read {
+        Err(DatasetError::Missing { .. }) => Ok(None),
+        read => read.map(Some),
+    }
+}
+
 impl From<ImageError> for DatasetError {
     fn from(error: ImageError) -> Self {
         match &error {

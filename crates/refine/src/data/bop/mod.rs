@@ -22,13 +22,12 @@ mod pose;
 mod results;
 mod touch;
 
-pub use arrival::Stamp;
 pub use bodies::{Body, BodyKind, SceneBodies};
 pub(crate) use bodies::{BodyEntry, read_bodies, sigmas};
 pub use dataset::{Dataset, DatasetScene};
 pub use detections::Detections;
 pub use error::DatasetError;
-pub(crate) use error::Origin;
+pub(crate) use error::{Origin, present};
 pub use files::{check_writable, create_folder, write_atomically};
 pub(crate) use files::{lock, open_locked, read_bytes, read_text};
 pub use frame::DatasetImage;
@@ -48,4 +47,4 @@ pub use results::{
     write_results,
 };
 pub(crate) use touch::TactileEntry;
-pub use touch::{Tactile, TactileReading, UNITS_PER_NEWTON};
+pub use touch::{Tactile, TactileReading};

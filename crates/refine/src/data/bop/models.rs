@@ -7,7 +7,7 @@ use prehend_geometry::cloud::diameter;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
-use super::error::DatasetError;
+use super::error::{DatasetError, present};
 use super::files::{names, write_atomically};
 use super::json::{JsonFile, UniqueMap, read_json};
 use super::numbers::{Numbers, Positive, Real};
@@ -205,10 +205,7 @@ pub fn write_symmetries(
 ) -> Result<(), DatasetError> {
     let file = models.dir().join("models_info.json");
     // Strictly: numbers that JSON does not know could not be written back.
-    let mut list: UniqueMap<Map<String, Value>> = match read_json(&file) {
-        Err(DatasetError::Missing { .. }) => UniqueMap::default(),
-        read => read?,
-    };
+    let mut list: UniqueMap<Map<String, Value>> = present(read_json(&file))?.unwrap_or_default();
     // There may be zeros before its number.
     let own = list.0.keys().find(|key| key.parse::<u32>() == Ok(obj_id)).cloned();
     let key = own.unwrap_or_else(|| obj_id.to_string());

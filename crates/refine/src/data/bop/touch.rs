@@ -10,9 +10,6 @@ use super::error::{DatasetError, Origin};
 use super::json::JsonFile;
 use super::numbers::{NonNegative, Numbers};
 
-/// Force units of `scene_tactile.json` per newton.
-pub const UNITS_PER_NEWTON: f64 = 1000.0;
-
 /// One sensor of touch in one image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tactile {
@@ -23,6 +20,11 @@ pub struct Tactile {
     /// Values of the sensor.
     pub reading: TactileReading,
     pub(crate) origin: Origin,
+}
+
+impl Tactile {
+    /// Force units of `scene_tactile.json` per newton.
+    pub const UNITS_PER_NEWTON: f64 = 1000.0;
 }
 
 /// Reading of a tactile sensor.
@@ -103,7 +105,7 @@ impl TactileEntry {
                 let force = self.force.filter(|force| !force.is_empty());
                 let force = force.ok_or_else(missing("force"))?.into_iter();
                 TactileReading::Force(
-                    force.map(|f| Vector3::from(f.0) / UNITS_PER_NEWTON).collect(),
+                    force.map(|f| Vector3::from(f.0) / Tactile::UNITS_PER_NEWTON).collect(),
                 )
             }
             SensorKindName::Binary => {

@@ -23,4 +23,4 @@ pub use summary::{ScoredRow, Statistic, Summary, summarize};
 pub use table::Table;
 pub(crate) use vsd::{VSD_TOLERANCES, vsd};
 
-pub use crate::data::{CONTACT_SAMPLES, ContactModel};
+pub use crate::data::ContactModel;

@@ -6,7 +6,7 @@ mod picture;
 
 #[cfg(feature = "cli")]
 pub use page::{
-    Chart, Column, DrawnFrame, Figure, FrameDrawing, FrameReport, Report, Series, flags,
-    least_sure, pose_figures,
+    Chart, Column, DrawnFrame, FrameDrawing, FrameReport, Report, Series, flags, least_sure,
+    pose_figures,
 };
 pub use picture::{before_and_after, depth_residual_picture, outline_picture, rig_picture};

@@ -14,7 +14,7 @@ use prehend_geometry::TriMesh;
 use prehend_render::RgbImage;
 use serde_json::json;
 
-pub use self::document::{Chart, Column, Figure, Series};
+pub use self::document::{Chart, Column, Series};
 use self::document::{Document, LabeledPicture};
 pub use self::figures::{flags, least_sure, pose_figures};
 pub use self::frame::{DrawnFrame, FrameDrawing, FrameReport};

@@ -21,7 +21,7 @@ pub use file::StudyFile;
 pub use initial_pose::InitialPose;
 pub use kind::Kind;
 pub use page::write_page;
-pub use record::{COLUMNS, Key, Record};
+pub use record::{Key, Record};
 pub use runner::Runner;
 pub use sweep::Sweep;
 pub use tables::tables;

@@ -16,7 +16,7 @@ pub(super) const INITIAL: &str = "initial";
 const OK: &str = "ok";
 
 /// Names of the columns of a [`Record`], units included; docs/STUDY.md describes them.
-pub const COLUMNS: &str = "study,dataset,level,frame,method,steps,sweep,amount,frames,scene_id,im_id,obj_id,iteration,seconds,status,\
+pub(super) const COLUMNS: &str = "study,dataset,level,frame,method,steps,sweep,amount,frames,scene_id,im_id,obj_id,iteration,seconds,status,\
     qw,qx,qy,qz,tx_m,ty_m,tz_m,\
     pe_cm,oe_deg,oe_symmetric_deg,add_mm,adi_mm,mssd_mm,mspd_px,ca_cm2,iv_cm3,delta_ca_cm2,delta_iv_cm3,vsd,ar,\
     distance_mm,angle_deg,sigma_mm,sigma_deg,bound_mm,bound_deg,d2_pose,d2_position,d2_orientation,\

@@ -11,7 +11,7 @@ use super::prediction::StudyPrediction;
 use super::record::{INITIAL, Record, TRUTH};
 use super::sweep::Sweep;
 use crate::data::bop::{Dataset, ResultRow};
-use crate::data::{AssetError, Assets, PlainPose, Sensor, Target};
+use crate::data::{AssetError, Assets, PlainPose, Target};
 use crate::error::{RefineError, guard};
 use crate::evaluate::scoring::Scorer;
 use crate::method::Method;
@@ -110,7 +110,7 @@ impl<'a> Runner<'a> {
         let target = Target { scene_id, im_id, obj_id, instance: initial.instance };
         let mut input = {
             let mut assets = self.assets.lock().unwrap_or_else(PoisonError::into_inner);
-            assets.load(&target, Some(&row.t_cam_model), &Sensor::required_by(method))?
+            assets.load(&target, Some(&row.t_cam_model), method.gradients())?
         };
         if let Some((sweep, amount)) = fault {
             sweep.perturb(&mut input.frame, amount, sweep.seed(row));

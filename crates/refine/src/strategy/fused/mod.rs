@@ -24,7 +24,6 @@ pub(crate) use self::factors::{problem_of, surface_patches};
 pub use self::fit::{Consistency, Fit, FitSettings};
 use self::hypotheses::conventions;
 pub use self::model_scale::{ModelScale, ModelScaleSettings};
-pub use self::nominal::NominalSizeError;
 pub(crate) use self::pixels::FusedPixels;
 pub use self::posterior::{
     Inconsistency, Posterior, PosteriorMode, PosteriorSettings, UnobservableDirection,

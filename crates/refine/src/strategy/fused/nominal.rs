@@ -1,29 +1,7 @@
 //! Nominal sizes of errors by name, as `--noise` has them.
 
-use thiserror::Error;
-
 use super::FusedSettings;
 use crate::MM_PER_M;
-
-/// Why a nominal size is not taken.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum NominalSizeError {
-    /// No size has this name.
-    #[error("there is no size {name:?}: one of {}", names().join(", "))]
-    Name {
-        /// The name given.
-        name: String,
-    },
-    /// It is not a number with a unit that fits.
-    #[error("{value:?} is not a size: a number that is not negative, with one of the units {}", units.join(", "))]
-    Value {
-        /// The text given.
-        value: String,
-        /// Units of this size.
-        units: Vec<&'static str>,
-    },
-}
 
 /// Physical dimension of a size.
 #[derive(Clone, Copy)]
@@ -72,17 +50,13 @@ const SIZES: [(&str, NominalQuantity, Field); 17] = [
 /// Standard deviation of what is exact, as a share of the nominal one.
 const EXACT: f64 = 1e-4;
 
-fn names() -> Vec<&'static str> {
-    SIZES.iter().map(|size| size.0).collect()
-}
-
 impl FusedSettings {
     /// Replaces the nominal size of the errors called `name` by `value`, a number with a unit such as `5mm`, `0.3deg` or `1%`; `0` for exact.
     ///
     /// By which factor they are larger or smaller is still learnt, as far as [`scales`](Self::scales) lets it.
     ///
     /// # Errors
-    /// [`NominalSizeError`] if there is no such size, or `value` is none.
+    /// Reason that there is no such size, or that `value` is none.
     ///
     /// ```
     /// use prehend_refine::strategy::FusedSettings;
@@ -92,9 +66,10 @@ impl FusedSettings {
     /// assert_eq!(settings.prior.hand_translation, 5e-3);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn set_nominal_size(&mut self, name: &str, value: &str) -> Result<(), NominalSizeError> {
+    pub fn set_nominal_size(&mut self, name: &str, value: &str) -> Result<(), String> {
         let Some((_, quantity, field)) = SIZES.iter().find(|size| size.0 == name) else {
-            return Err(NominalSizeError::Name { name: name.to_owned() });
+            let names = SIZES.map(|size| size.0).join(", ");
+            return Err(format!("there is no size {name:?}: one of {names}"));
         };
         let units = quantity.units();
         let end = value.find(|c: char| c.is_alphabetic() && c != 'e' || c == '%');
@@ -106,9 +81,10 @@ impl FusedSettings {
             (Some(number), Some(factor)) => Some(number * factor),
             _ => None,
         };
-        let size = size.ok_or_else(|| NominalSizeError::Value {
-            value: value.to_owned(),
-            units: units.iter().map(|known| known.0).filter(|unit| !unit.is_empty()).collect(),
+        let size = size.ok_or_else(|| {
+            let units = units.iter().map(|known| known.0).filter(|unit| !unit.is_empty());
+            let units = units.collect::<Vec<_>>().join(", ");
+            format!("{value:?} is not a size: a number that is not negative, with one of the units {units}")
         })?;
         let Some(field) = field(self) else { return Ok(()) };
         let before = std::mem::replace(field, if size > 0.0 { size } else { EXACT * *field });
@@ -147,10 +123,10 @@ mod tests {
         let mut settings = FusedSettings::default();
         for value in ["", "mm", "-1mm", "nanmm", "1", "1deg", "1e400mm"] {
             let error = settings.set_nominal_size("hand.translation", value).unwrap_err();
-            assert!(error.to_string().ends_with("one of the units mm, m"), "{value} {error}");
+            assert!(error.ends_with("one of the units mm, m"), "{value} {error}");
         }
         let error = settings.set_nominal_size("hand.rotaton", "1deg").unwrap_err();
-        assert!(error.to_string().contains("hand.rotation"));
+        assert!(error.contains("hand.rotation"));
         assert_eq!(settings, FusedSettings::default());
         settings.set_nominal_size("depth.bias", "1e-3m").unwrap();
         assert_eq!(settings.prior.depth_bias, 1e-3);

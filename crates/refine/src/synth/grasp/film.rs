@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
 
-use super::error::GraspError;
 use super::grasper::Grasper;
 use super::trajectory::GraspSnapshot;
+use crate::synth::error::SynthError;
 use crate::synth::pose_noise::random_direction;
 
 /// The part of a film before the object is dropped.
@@ -21,13 +21,13 @@ impl Grasper<'_> {
     /// of the seeds from `first_seed` on, and from its complement.
     ///
     /// # Errors
-    /// [`GraspError::NoGrasp`] if none of `tries` seeds leads to one.
+    /// [`SynthError::Refused`] if none of `tries` seeds leads to one.
     pub fn dropping(
         &self,
         first_seed: u64,
         tries: u64,
         steps: usize,
-    ) -> Result<Vec<GraspSnapshot>, GraspError> {
+    ) -> Result<Vec<GraspSnapshot>, SynthError> {
         let down = random_direction(&mut SplitMix64::new(first_seed)) * self.settings.gravity;
         let before = (BEFORE * steps as f64) as usize;
         let between = ((OPENING + EMPTY) / self.settings.frame_time) as usize;

@@ -5,11 +5,9 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3};
 use prehend_geometry::sample::surface_samples;
 use prehend_geometry::{ClosestPoints, SolidUnion, SplitMix64};
-use prehend_sim::contact::LawError;
 use prehend_sim::{Coulomb, DynContactLaw, KelvinVoigt, Law, RigidBody};
 
 use super::drive::levers;
-use super::error::GraspError;
 use super::placement::Placement;
 use super::preshape::Preshape;
 use super::self_collision::SelfCollision;
@@ -17,7 +15,9 @@ use super::settings::GraspSettings;
 use super::simulation::GraspSimulation;
 use super::trajectory::GraspSnapshot;
 use crate::data::ContactModel;
+use crate::error::RefineError;
 use crate::scene::{Hand, Object};
+use crate::synth::error::SynthError;
 use crate::synth::pose_noise::random_direction;
 
 /// An object at rest in a hand.
@@ -87,12 +87,15 @@ impl<'a> Grasper<'a> {
         robot: &'a Hand,
         object: &Object,
         settings: &GraspSettings,
-    ) -> Result<Self, GraspError> {
+    ) -> Result<Self, SynthError> {
         settings.check()?;
         let preshape = Preshape::of(robot)?;
         let inertial = &object.inertial;
         let body = RigidBody::new(inertial.mass, inertial.inertia, inertial.center_of_mass);
-        let body = body.map_err(|reason| GraspError::Object(object.name.clone(), reason))?;
+        let body = body.map_err(|reason| RefineError::Object {
+            object: object.name.clone(),
+            reason: reason.to_string(),
+        })?;
         let count = (object.area / settings.sample_spacing.powi(2)).clamp(SAMPLES.0, SAMPLES.1);
         let solid = object.mesh.cleaned().0;
         let samples = surface_samples(&solid, count as usize, 0);
@@ -100,9 +103,9 @@ impl<'a> Grasper<'a> {
         let samples = samples.iter().map(|s| s.point).collect();
         // Backward Euler damps what is faster than its step: contacts need no damping of their own.
         let spring = KelvinVoigt { stiffness: settings.stiffness, damping: 0.0 };
-        let law = |slip_scale| -> Result<Arc<dyn DynContactLaw>, LawError> {
+        let law = |slip_scale| -> Result<Arc<dyn DynContactLaw>, SynthError> {
             let friction = Coulomb { friction: settings.friction, slip_scale };
-            Ok(Arc::new(Law::new(spring, friction)?))
+            Ok(Arc::new(Law::new(spring, friction).map_err(SynthError::refused)?))
         };
         let paths = robot.tree.paths();
         let open = robot.tree.forward_kinematics(&preshape.open);
@@ -129,7 +132,7 @@ impl<'a> Grasper<'a> {
     ///
     /// # Errors
     /// The reason that there is none.
-    pub fn grasp(&self, seed: u64) -> Result<Grasp, GraspError> {
+    pub fn grasp(&self, seed: u64) -> Result<Grasp, SynthError> {
         let mut random = SplitMix64::new(seed);
         let settings = &self.settings;
         let (joints, t_hand_object) = self.placement.draw(self, &mut random)?;
@@ -161,13 +164,13 @@ impl<'a> Grasper<'a> {
     /// [`trajectory`](Self::trajectory).
     ///
     /// # Errors
-    /// [`GraspError::NoGrasp`] if none of `tries` seeds leads to one.
+    /// [`SynthError::Refused`] if none of `tries` seeds leads to one.
     pub fn sequence(
         &self,
         first_seed: u64,
         tries: u64,
         steps: usize,
-    ) -> Result<Vec<GraspSnapshot>, GraspError> {
+    ) -> Result<Vec<GraspSnapshot>, SynthError> {
         self.first_that_holds(first_seed, tries, |grasp, seed| self.trajectory(grasp, seed, steps))
     }
 
@@ -176,8 +179,8 @@ impl<'a> Grasper<'a> {
         &self,
         first_seed: u64,
         tries: u64,
-        moments: impl Fn(&Grasp, u64) -> Result<Vec<GraspSnapshot>, GraspError>,
-    ) -> Result<Vec<GraspSnapshot>, GraspError> {
+        moments: impl Fn(&Grasp, u64) -> Result<Vec<GraspSnapshot>, SynthError>,
+    ) -> Result<Vec<GraspSnapshot>, SynthError> {
         let mut last = None;
         for seed in (0..tries).map(|k| first_seed.wrapping_add(k)) {
             match self.grasp(seed).and_then(|grasp| moments(&grasp, seed)) {
@@ -186,12 +189,12 @@ impl<'a> Grasper<'a> {
             }
         }
         let last = last.map_or_else(String::new, |error| format!("; the last: {error}"));
-        Err(GraspError::NoGrasp(format!("no grasp after {tries} tries{last}")))
+        Err(SynthError::Refused(format!("no grasp after {tries} tries{last}")))
     }
 
     /// Closes the hand around the floating object, until all is at rest or nearly so when time is up: some fingers go on
     /// creeping, and whether the object is held will be seen.
-    fn close(&self, simulation: &mut GraspSimulation<'_>) -> Result<(), GraspError> {
+    fn close(&self, simulation: &mut GraspSimulation<'_>) -> Result<(), SynthError> {
         let steps = |time: f64| (time / self.settings.time_step).ceil() as usize;
         let mut still = 0;
         for _ in 0..steps(self.settings.closing_time) {
@@ -210,11 +213,11 @@ impl<'a> Grasper<'a> {
     }
 
     /// Refuses an object that moves faster than this many times what counts as still.
-    fn check_rest(&self, simulation: &GraspSimulation<'_>, times: f64) -> Result<(), GraspError> {
+    fn check_rest(&self, simulation: &GraspSimulation<'_>, times: f64) -> Result<(), SynthError> {
         let (speed, spin) = simulation.speed();
         let rests = speed < times * STILL.1 && spin < times * STILL.2;
         let error = "hand and object did not come to rest";
-        if rests { Ok(()) } else { Err(GraspError::NoGrasp(error.into())) }
+        if rests { Ok(()) } else { Err(SynthError::Refused(error.into())) }
     }
 
     /// Lets gravity pull in several directions; how far the object moves and turns at most.
@@ -222,7 +225,7 @@ impl<'a> Grasper<'a> {
         &self,
         simulation: &mut GraspSimulation<'_>,
         random: &mut SplitMix64,
-    ) -> Result<(f64, f64), GraspError> {
+    ) -> Result<(f64, f64), SynthError> {
         let start = simulation.t_hand_object();
         let (mut drift, mut turn) = (0.0, 0.0);
         for _ in 0..self.settings.hold_directions {
@@ -243,7 +246,7 @@ impl<'a> Grasper<'a> {
         &self,
         from: &Isometry3<f64>,
         to: &Isometry3<f64>,
-    ) -> Result<(f64, f64), GraspError> {
+    ) -> Result<(f64, f64), SynthError> {
         let center: Point3<f64> = *self.body.com();
         let (distance, angle) =
             ((to * center - from * center).norm(), from.rotation.angle_to(&to.rotation));
@@ -252,37 +255,37 @@ impl<'a> Grasper<'a> {
             return Ok((distance, angle));
         }
         let (distance, angle) = (distance * 1e3, angle.to_degrees());
-        Err(GraspError::NoGrasp(format!("the object slipped by {distance:.1} mm and {angle:.1}°")))
+        Err(SynthError::Refused(format!("the object slipped by {distance:.1} mm and {angle:.1}°")))
     }
 
     /// Links that touch, if they are enough.
-    fn check_links(&self, simulation: &GraspSimulation<'_>) -> Result<Vec<usize>, GraspError> {
+    fn check_links(&self, simulation: &GraspSimulation<'_>) -> Result<Vec<usize>, SynthError> {
         let mut forces = vec![0.0; simulation.poses.len()];
         for touch in simulation.touches() {
             forces[touch.link] += touch.force.norm();
         }
         let links: Vec<usize> = (0..forces.len()).filter(|&l| forces[l] > TOUCHING).collect();
         if links.len() < self.settings.links {
-            return Err(GraspError::NoGrasp(format!("{} links touch the object", links.len())));
+            return Err(SynthError::Refused(format!("{} links touch the object", links.len())));
         }
         Ok(links)
     }
 
     /// Contact area \[cm²\] and shared volume \[cm³\], within their bounds.
-    fn measure(&self, simulation: &GraspSimulation<'_>) -> Result<(f64, f64), GraspError> {
+    fn measure(&self, simulation: &GraspSimulation<'_>) -> Result<(f64, f64), SynthError> {
         let t_hand_object = &simulation.t_hand_object();
         let hand = self.robot.posed(&Isometry3::identity(), &simulation.joints)?;
         let hand = SolidUnion::new(&hand.mesh_parts())?;
         let volume = self.contact.intersection_volume_cm3(t_hand_object, &hand)?;
         if volume > self.settings.intersection_volume {
             let error = format!("hand and object share {volume:.2} cm³");
-            return Err(GraspError::NoGrasp(error));
+            return Err(SynthError::Refused(error));
         }
         let surface = ClosestPoints::new(&hand.mesh())?;
         let area = self.contact.contact_area_cm2(t_hand_object, &surface);
         let (least, most) = self.settings.contact_area;
         if !(least..=most).contains(&area) {
-            return Err(GraspError::NoGrasp(format!("the contact area is {area:.1} cm²")));
+            return Err(SynthError::Refused(format!("the contact area is {area:.1} cm²")));
         }
         Ok((area, volume))
     }

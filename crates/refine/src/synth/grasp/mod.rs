@@ -5,7 +5,6 @@
 //! is a rigid body that touches their distance fields by penalty contacts with friction.
 
 mod drive;
-mod error;
 mod film;
 mod grasper;
 mod placement;
@@ -18,7 +17,6 @@ mod skin;
 mod tests;
 mod trajectory;
 
-pub use error::GraspError;
 pub use grasper::{Grasp, Grasper};
 pub use settings::GraspSettings;
 pub use trajectory::GraspSnapshot;

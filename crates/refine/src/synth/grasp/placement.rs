@@ -4,9 +4,9 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
 use prehend_geometry::robot::PosedRobot;
 
-use super::error::GraspError;
 use super::grasper::Grasper;
 use crate::scene::Object;
+use crate::synth::error::SynthError;
 
 /// Points of the object that must stay clear of the hand.
 const PROBES: usize = 600;
@@ -56,7 +56,7 @@ impl Placement {
         &self,
         grasper: &Grasper<'_>,
         random: &mut SplitMix64,
-    ) -> Result<(Vec<f64>, Isometry3<f64>), GraspError> {
+    ) -> Result<(Vec<f64>, Isometry3<f64>), SynthError> {
         let Grasper { robot, preshape, settings, .. } = grasper;
         let palm = Point3::from(preshape.t_hand_palm.translation.vector);
         for _ in 0..DRAWS {
@@ -108,7 +108,7 @@ impl Placement {
                 return Ok((joints, t_hand_object));
             }
         }
-        Err(GraspError::NoGrasp("the fingers keep the object from the palm".into()))
+        Err(SynthError::Refused("the fingers keep the object from the palm".into()))
     }
 
     /// Distance of the probes from the surfaces of the hand \[m\], infinite where they are far.

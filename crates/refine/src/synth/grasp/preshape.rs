@@ -4,9 +4,9 @@ use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use prehend_geometry::hand::JOINT_NAMES;
 use prehend_geometry::robot::KinematicTree as Tree;
 
-use super::error::GraspError;
 use super::self_collision::ball;
 use crate::scene::Hand;
+use crate::synth::error::SynthError;
 
 /// The open hand and the way it closes. Joints are in the order of the robot's joint names.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,7 +32,7 @@ impl Preshape {
     ///
     /// # Errors
     /// As [`Preshape::guess`].
-    pub(super) fn of(robot: &Hand) -> Result<Self, GraspError> {
+    pub(super) fn of(robot: &Hand) -> Result<Self, SynthError> {
         Self::built_in(&robot.tree).map_or_else(|| Self::guess(robot), Ok)
     }
 
@@ -61,8 +61,8 @@ impl Preshape {
     /// of what is next to it, that is nearest to that point.
     ///
     /// # Errors
-    /// [`GraspError::NoFingers`] if no joint does so.
-    pub(super) fn guess(robot: &Hand) -> Result<Self, GraspError> {
+    /// [`SynthError::Refused`] if no joint does so.
+    pub(super) fn guess(robot: &Hand) -> Result<Self, SynthError> {
         let tree = &robot.tree;
         let limits = tree.joint_limits();
         let bounded = |&(lower, upper): &(f64, f64)| lower.is_finite() && upper.is_finite();
@@ -105,7 +105,7 @@ impl Preshape {
         let nearer: Vec<f64> = limits.iter().enumerate().map(|(v, l)| nearer(v, l)).collect();
         let best = nearer.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
         if best <= 0.0 {
-            return Err(GraspError::NoFingers);
+            return Err(SynthError::refused("the robot has no joint that would close its fingers"));
         }
         let (mut open, mut speed) = (middle, vec![0.0; limits.len()]);
         for (v, (lower, upper)) in limits.iter().enumerate() {

@@ -3,10 +3,10 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use prehend_geometry::SplitMix64;
 
-use super::error::GraspError;
 use super::grasper::{Grasp, Grasper};
 use super::simulation::GraspSimulation;
 use super::skin::taxel_forces;
+use crate::synth::error::SynthError;
 use crate::synth::pose_noise::random_direction;
 
 /// One moment of an object held in a hand, as it truly is.
@@ -44,13 +44,13 @@ impl Grasper<'_> {
     /// grasp and seed.
     ///
     /// # Errors
-    /// [`GraspError::NoGrasp`] if the object does not stay in the hand; faults of the simulation.
+    /// [`SynthError::Refused`] if the object does not stay in the hand; faults of the simulation.
     pub fn trajectory(
         &self,
         grasp: &Grasp,
         seed: u64,
         steps: usize,
-    ) -> Result<Vec<GraspSnapshot>, GraspError> {
+    ) -> Result<Vec<GraspSnapshot>, SynthError> {
         let mut random = SplitMix64::new(seed);
         let down = random_direction(&mut random) * self.settings.gravity;
         self.moments(grasp, &mut random, steps, &UnitQuaternion::identity(), &down)
@@ -64,7 +64,7 @@ impl Grasper<'_> {
         steps: usize,
         turn: &UnitQuaternion<f64>,
         down: &Vector3<f64>,
-    ) -> Result<Vec<GraspSnapshot>, GraspError> {
+    ) -> Result<Vec<GraspSnapshot>, SynthError> {
         let settings = &self.settings;
         let turning: [Waves; 3] = std::array::from_fn(|_| Waves::new(random));
         let squeezing = Waves::new(random);

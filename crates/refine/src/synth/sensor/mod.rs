@@ -18,6 +18,6 @@ mod viewpoint;
 pub use film::FilmSettings;
 pub(super) use lens::SimulatedLens;
 pub(super) use rig::SensorRig;
-pub use settings::{SensorSettings, SettingError};
+pub use settings::SensorSettings;
 #[cfg(feature = "cli")]
 pub(crate) use smooth_field::smooth_field;

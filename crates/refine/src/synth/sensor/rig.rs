@@ -16,7 +16,7 @@ use super::film::{FilmScene, FilmSettings};
 use super::lens::SimulatedLens;
 use super::settings::SensorSettings;
 use super::touch::TaxelCondition;
-use crate::data::bop::{UNITS_PER_NEWTON, rotation_to_row_major, translation_to_mm};
+use crate::data::bop::{Tactile, rotation_to_row_major, translation_to_mm};
 use crate::scene::{Frame, Hand, Object, prismatic_joints};
 use crate::synth::annotation;
 use crate::synth::files::Shot;
@@ -90,7 +90,8 @@ impl<'a> SensorRig<'a> {
         let names = self.robot.tree.joint_names().iter().cloned();
         let joints = names.zip(hand.joints.iter().map(|error| json!(-error)));
         let t_said_true = hand.pose.inverse();
-        let felt = |taxel: &TaxelCondition| <[f64; 3]>::from(taxel.phantom / UNITS_PER_NEWTON);
+        let felt =
+            |taxel: &TaxelCondition| <[f64; 3]>::from(taxel.phantom / Tactile::UNITS_PER_NEWTON);
         let mut faults = json!({
             "focal_scale": focal.map(|scale| 1.0 / scale),
             "principal_point_px": principal.map(|shift| -shift * camera.width as f64),

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use prehend_geometry::SplitMix64;
 
 use super::settings::TouchSettings;
-use crate::data::bop::UNITS_PER_NEWTON;
+use crate::data::bop::Tactile;
 
 impl TouchSettings {
     /// Conditions of `count` taxels through a grasp.
@@ -37,7 +37,7 @@ impl TouchSettings {
             if taxel.gain == 0.0 {
                 return Vector3::zeros();
             }
-            let felt = force * (taxel.gain * UNITS_PER_NEWTON) + taxel.phantom + jitter;
+            let felt = force * (taxel.gain * Tactile::UNITS_PER_NEWTON) + taxel.phantom + jitter;
             if felt.norm() < self.threshold {
                 return Vector3::zeros();
             }
@@ -46,7 +46,7 @@ impl TouchSettings {
                 if self.quantum > 0.0 { (v / self.quantum).round() * self.quantum } else { v }
             };
             // Adding zero makes the negative zero a positive one.
-            felt.map(|v| step(v).clamp(-limit, limit) / UNITS_PER_NEWTON + 0.0)
+            felt.map(|v| step(v).clamp(-limit, limit) / Tactile::UNITS_PER_NEWTON + 0.0)
         };
         forces.iter().zip(condition).map(read).collect()
     }

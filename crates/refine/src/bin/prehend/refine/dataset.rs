@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use prehend_refine::data::bop::{Dataset, DatasetError, ReadResults, ResultRow, read_results};
 use prehend_refine::data::details::{FrameDetails, write_details};
 use prehend_refine::data::identity::{SENSED, canonical, dataset_fingerprint, file_fingerprint};
-use prehend_refine::data::{AssetError, Assets, Identity, Journal, Sensor, write_times};
+use prehend_refine::data::{AssetError, Assets, Identity, Journal, write_times};
 use prehend_refine::evaluate::Scorer;
 use prehend_refine::evaluate::report::{FrameDrawing, Report, least_sure};
 use prehend_refine::strategy::DiagnosisSummary;
@@ -166,11 +166,7 @@ impl DatasetRun<'_> {
     fn refine(&self, assets: &Mutex<Assets>, job: &Job) -> anyhow::Result<RefinedFrame> {
         let input = {
             let mut assets = assets.lock().unwrap_or_else(PoisonError::into_inner);
-            assets.load(
-                &job.target,
-                Some(&job.row.t_cam_model),
-                &Sensor::required_by(&self.method),
-            )?
+            assets.load(&job.target, Some(&job.row.t_cam_model), self.method.gradients())?
         };
         let estimator = input.estimator(&self.method).backend(Arc::clone(&self.backend));
         let (frame, hypotheses) = (&input.frame, &job.hypotheses);
@@ -209,8 +205,8 @@ impl DatasetRun<'_> {
         for (index, (job, refined)) in bar.wrap_iter(frames.iter().enumerate()) {
             let (initial, pose) = (job.row.t_cam_model, (&refined.pose).into());
             let mut draw = || -> Result<_, AssetError> {
-                let required = Sensor::required_by(&self.method);
-                let input = assets.load(&job.target, Some(&initial), &required)?;
+                let required = self.method.gradients();
+                let input = assets.load(&job.target, Some(&initial), required)?;
                 report.draw(&FrameDrawing {
                     input: &input.estimator(&self.method).input(&input.frame, &initial)?,
                     initial: Some(&initial),

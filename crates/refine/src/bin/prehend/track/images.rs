@@ -4,11 +4,11 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::{anyhow, bail};
 use prehend_refine::data::Assets;
-use prehend_refine::data::bop::{DatasetScene, Stamp};
+use prehend_refine::data::bop::DatasetScene;
 
 use crate::options::Selection;
 
@@ -42,7 +42,7 @@ pub(super) struct Watch {
     /// or somebody says so.
     stop: Arc<AtomicBool>,
     /// Of the JSON files that were read, and the images that they list.
-    stamps: Option<[Stamp; 3]>,
+    stamps: Option<[Option<(u64, SystemTime)>; 3]>,
     listed: Vec<u32>,
     /// An image that is there already: those before it are not waited for.
     arrived: u32,

@@ -54,9 +54,6 @@ impl Column {
     }
 }
 
-/// A number of a frame in its column's unit, where it is known.
-pub type Figure = (Column, Option<f64>);
-
 /// Curves over one axis.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Chart {

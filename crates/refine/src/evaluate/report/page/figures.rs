@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::document::{Column, Figure};
+use super::document::Column;
 use crate::strategy::PosteriorSummary;
 
 const ERROR: Column = Column::new("error", "error", "mm", 2);
@@ -19,7 +19,10 @@ pub(super) const SECONDS: Column = Column::new("seconds", "time", "s", 3);
 pub(super) const ITERATIONS: Column = Column::new("iterations", "iterations", "", 0);
 
 /// Figures of a pose: its error \[m, rad\], where the truth is known, and how sure it is.
-pub fn pose_figures(error: Option<[f64; 2]>, confidence: Option<&PosteriorSummary>) -> Vec<Figure> {
+pub fn pose_figures(
+    error: Option<[f64; 2]>,
+    confidence: Option<&PosteriorSummary>,
+) -> Vec<(Column, Option<f64>)> {
     let length = |sigmas: [f64; 3]| sigmas.iter().map(|s| s * s).sum::<f64>().sqrt();
     vec![
         (ERROR, error.map(|[meters, _]| 1e3 * meters)),

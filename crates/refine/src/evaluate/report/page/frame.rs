@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Isometry3;
 use serde::{Serialize, Serializer};
 
-use super::document::{Chart, Figure, LabeledPicture, Series};
+use super::document::{Chart, Column, LabeledPicture, Series};
 use super::figures::{self, flags, pose_figures};
 use super::scene::EncodedScene;
 use crate::calibration::{FrameResiduals, SensorResidual};
@@ -27,7 +27,7 @@ pub struct FrameReport {
     pub remarks: Vec<String>,
     /// Its numbers.
     #[serde(serialize_with = "by_key")]
-    pub figures: Vec<Figure>,
+    pub figures: Vec<(Column, Option<f64>)>,
     /// How sure the pose is, where that is known.
     pub posterior: Option<PosteriorSummary>,
     /// The frame as it was drawn, if it was.
@@ -68,7 +68,10 @@ impl FrameReport {
 }
 
 /// Known figures by the keys of their columns.
-fn by_key<S: Serializer>(figures: &[Figure], serializer: S) -> Result<S::Ok, S::Error> {
+fn by_key<S: Serializer>(
+    figures: &[(Column, Option<f64>)],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
     let known = figures.iter().filter_map(|(column, value)| Some((column.key, (*value)?)));
     serializer.collect_map(known.collect::<BTreeMap<_, _>>())
 }
