@@ -8,7 +8,7 @@ use std::{fs, io};
 const BUDGETS: [(&str, usize); 5] = [
     ("autodiff", 3_396),
     ("geometry", 14_981),
-    ("sim", 16_435),
+    ("sim", 16_458),
     ("render", 10_220),
     ("refine", 30_659),
 ];
