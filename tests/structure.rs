@@ -7,7 +7,7 @@ use std::{fs, io};
 /// Lines of code of each crate at most, without blanks, comments and tests. More needs a reason in the commit that raises it.
 const BUDGETS: [(&str, usize); 5] = [
     ("autodiff", 3_396),
-    ("geometry", 14_962),
+    ("geometry", 14_928),
     ("sim", 16_689),
     ("render", 10_220),
     ("refine", 30_659),
