@@ -25,9 +25,6 @@ pub const MAX_PLY_HEADER: usize = 1 << 20;
 /// Largest robot description \[bytes\].
 pub const MAX_URDF_BYTES: usize = 1 << 26;
 
-/// Deepest nesting of tags in a robot description, whose readers descend by recursion.
-pub const MAX_URDF_DEPTH: usize = 64;
-
 /// Largest MJCF model with all files that it includes \[bytes\].
 pub const MAX_MJCF_BYTES: usize = 1 << 26;
 

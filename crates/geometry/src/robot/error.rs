@@ -95,10 +95,10 @@ pub enum RobotError {
         /// The joints whose limits these are.
         by: String,
     },
-    /// A description too large or nested too deeply.
+    /// A description too large.
     #[error("the description is too large: {count} {what}, at most {limit} are read")]
     TooLarge {
-        /// Bytes, or levels of tags.
+        /// Bytes.
         what: &'static str,
         /// How many.
         count: usize,

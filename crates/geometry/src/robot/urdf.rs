@@ -14,7 +14,7 @@ use super::{
 };
 use crate::io::folder::Folder;
 use crate::io::read_plain;
-use crate::limits::{MAX_URDF_BYTES, MAX_URDF_DEPTH};
+use crate::limits::MAX_URDF_BYTES;
 use crate::read_options::ReadOptions;
 
 impl KinematicTree {
@@ -53,7 +53,10 @@ impl KinematicTree {
     }
 
     fn from_urdf(xml: &str, folder: Option<&Folder>, options: &ReadOptions) -> Result<Self> {
-        check_size(xml)?;
+        if xml.len() > MAX_URDF_BYTES {
+            let (count, limit) = (xml.len(), MAX_URDF_BYTES);
+            return Err(RobotError::TooLarge { what: "bytes", count, limit });
+        }
         let document = parse(xml.trim_start())?;
         let robot = document.root_element();
         let (mut links, mut tags) = (Vec::new(), Vec::new());
@@ -133,47 +136,6 @@ impl KinematicTree {
             warnings,
         })
     }
-}
-
-/// Refuses text that the XML reader would take too long for, or descend into until the stack ends.
-fn check_size(xml: &str) -> Result<()> {
-    let too_large = |what, count, limit| Err(RobotError::TooLarge { what, count, limit });
-    if xml.len() > MAX_URDF_BYTES {
-        return too_large("bytes", xml.len(), MAX_URDF_BYTES);
-    }
-    let mut depth = 0_usize;
-    let mut rest = xml;
-    while let Some(start) = rest.find('<') {
-        rest = &rest[start..];
-        let (end, change) = match rest {
-            _ if rest.starts_with("<!--") => (rest.find("-->"), 0),
-            _ if rest.starts_with("<![CDATA[") => (rest.find("]]>"), 0),
-            _ => (tag_end(rest), if rest.starts_with("</") { -1 } else { 1 }),
-        };
-        // What never ends is for the parser to complain about.
-        let Some(end) = end else { break };
-        let is_whole =
-            rest.starts_with("<!") || rest.starts_with("<?") || rest[..end].ends_with('/');
-        depth = depth.saturating_add_signed(if is_whole { 0 } else { change });
-        if depth > MAX_URDF_DEPTH {
-            return too_large("levels of tags", depth, MAX_URDF_DEPTH);
-        }
-        rest = &rest[end..];
-    }
-    Ok(())
-}
-
-/// Where the first tag of `text` ends: a `>` within quotes is part of a value.
-fn tag_end(text: &str) -> Option<usize> {
-    let mut quote = None;
-    text.bytes().position(|byte| {
-        match quote {
-            Some(open) if byte == open => quote = None,
-            None if byte == b'"' || byte == b'\'' => quote = Some(byte),
-            _ => {}
-        }
-        quote.is_none() && byte == b'>'
-    })
 }
 
 /// A joint as its element describes it.
@@ -391,13 +353,20 @@ mod tests {
     }
 
     #[test]
-    fn text_that_nests_without_end_is_refused() {
-        for tag in ["<link name=\"l\">", "<x>", "<!-- > --><gazebo>"] {
-            let xml = format!("<robot name=\"r\">{}", tag.repeat(200_000));
-            let error = KinematicTree::from_urdf_str(&xml, None).unwrap_err();
-            assert!(matches!(error, RobotError::TooLarge { limit: MAX_URDF_DEPTH, .. }), "{error}");
+    fn depth_of_tags_takes_no_stack() {
+        for (tag, end) in
+            [("<link name=\"l\">", "</link>"), ("<x>", "</x>"), ("<!-- > --><gazebo>", "</gazebo>")]
+        {
+            let open = format!("<robot name=\"r\"><link name=\"a\"/>{}", tag.repeat(200_000));
+            let error = KinematicTree::from_urdf_str(&open, None).unwrap_err();
+            assert!(matches!(error, RobotError::Urdf { .. }), "{error}");
+            // The outermost link counts alone.
+            let closed = format!("{open}{}</robot>", end.repeat(200_000));
+            let robot =
+                KinematicTree::from_urdf_str(&closed.replace("<link name=\"a\"/>", ""), None);
+            assert_eq!(robot.is_ok(), end == "</link>");
         }
-        // Many tags side by side are no nest, nor are comments and values that look like tags.
+        // Comments and values that look like tags are none.
         let link = |k: i32| format!("<!-- <a> --><link name=\"l{k}\"></link><x y='>'/>");
         let links: String = (0..300).map(link).collect();
         let error =
