@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use prehend::refine::data::bop::{Dataset, ResultRow, read_results};
 use prehend::refine::data::Assets;
+use prehend::refine::data::bop::{Dataset, ResultRow, read_results};
 use prehend::refine::evaluate::Scorer;
 use prehend::refine::evaluate::metrics::PoseScore;
 use prehend::refine::{Method, PreparedFrame, refine};
