@@ -10,7 +10,7 @@ const BUDGETS: [(&str, usize); 5] = [
     ("geometry", 14_975),
     ("sim", 16_540),
     ("render", 10_220),
-    ("refine", 30_505),
+    ("refine", 30_503),
 ];
 
 type Imports = BTreeMap<String, BTreeSet<String>>;

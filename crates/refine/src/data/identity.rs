@@ -82,10 +82,8 @@ pub fn file_fingerprint(file: &Path) -> Result<String, DatasetError> {
 
 /// JSON files of a scene that estimators read.
 pub const SENSED: [&str; 3] = ["scene_camera.json", "scene_bodies.json", "scene_tactile.json"];
-/// JSON files of a scene that only scoring reads.
-pub(crate) const TRUTH: [&str; 2] = ["scene_gt.json", "scene_bodies_gt.json"];
 
-/// A fingerprint of the files of all scenes that are called as one of `names` ([`SENSED`], [`TRUTH`]), and of the models'
+/// A fingerprint of the files of all scenes that are called as one of `names`, such as [`SENSED`], and of the models'
 /// `models_info.json`; not of pictures and meshes, which are many.
 ///
 /// # Errors

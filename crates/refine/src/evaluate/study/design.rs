@@ -7,11 +7,12 @@ use super::kind::Kind;
 use super::record::{INITIAL, Key, Record, TRUTH};
 use super::sweep::Sweep;
 use crate::data::bop::{Dataset, DatasetError};
-use crate::data::identity::{
-    SENSED, TRUTH as ANNOTATIONS, dataset_fingerprint, file_fingerprint, fingerprint, program,
-};
+use crate::data::identity::{SENSED, dataset_fingerprint, file_fingerprint, fingerprint, program};
 use crate::method::Method;
 use crate::strategy::Strategy;
+
+/// JSON files of a scene that only scoring reads.
+const ANNOTATIONS: [&str; 2] = ["scene_gt.json", "scene_bodies_gt.json"];
 
 /// All inputs and settings that determine a study's results, beside the initial poses.
 #[derive(Clone, Debug)]
