@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Matrix6, Point3, SVector, Vector3, Vector6};
 use prehend_autodiff::lie::{cross_matrix, so3_log};
 use prehend_autodiff::{Fwd, Quadratic, Scalar};
-use prehend_sim::rollout::StepError;
 use prehend_sim::prelude::*;
+use prehend_sim::rollout::StepError;
 use rayon::prelude::*;
 
 /// Scales of displacement \[1/m\], rotation \[1/rad\], linear velocity \[s/m\] and angular velocity \[s/rad\] that make the residuals of
