@@ -7,8 +7,8 @@ use std::{fs, io};
 /// Lines of code of each crate at most, without blanks, comments and tests. More needs a reason in the commit that raises it.
 const BUDGETS: [(&str, usize); 5] = [
     ("autodiff", 3_396),
-    ("geometry", 14_975),
-    ("sim", 16_540),
+    ("geometry", 14_939),
+    ("sim", 16_567),
     ("render", 10_220),
     ("refine", 30_503),
 ];
