@@ -1,6 +1,6 @@
 //! Ours among the peers: answers what `compare.py` asks, a line of JSON each.
 //!
-//! The argument says how to render: `contour 1` and `contour 4` (samples a pixel, across and down), or `softras 1`.
+//! The argument says how to render: `contour` or `softras`.
 
 mod reference;
 mod scene;
@@ -20,16 +20,14 @@ use serde_json::{Value, json};
 const HALF_WIDTH: f64 = 0.645;
 
 fn main() -> anyhow::Result<()> {
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    let mode = match words.first().map(String::as_str) {
+    let mode = match std::env::args().nth(1).as_deref() {
         Some("contour") => {
             Mode::Contour(ContourOptions { half_width: HALF_WIDTH, ..ContourOptions::default() })
         }
         Some("softras") => Mode::SoftRas(SoftRasOptions::default()),
-        _ => bail!("give a mode, contour or softras, and the samples a pixel"),
+        _ => bail!("give a mode, contour or softras"),
     };
-    let samples = words.get(1).context("the samples a pixel")?.parse()?;
-    let loss = PoseLoss::new(mode, LossOptions::default()).with_samples(samples);
+    let loss = PoseLoss::new(mode, LossOptions::default());
     let (mut scene, mut target) = (None, None);
     for line in std::io::stdin().lock().lines() {
         let request: Value = serde_json::from_str(&line?)?;

@@ -2,7 +2,6 @@
 
 use glam::Vec3;
 
-use super::drawing::Drawing;
 use crate::posed::Posed;
 use crate::shading::surface::PosedLight;
 
@@ -10,7 +9,8 @@ use crate::shading::surface::PosedLight;
 pub(crate) struct ContourScene<'a> {
     pub(crate) posed: Posed<'a>,
     pub(crate) lighting: PosedLight,
-    pub(crate) drawing: Drawing,
+    /// Half-width of the band across contours \[px\].
+    pub(crate) half_width: f32,
     pub(crate) twist_center: Vec3,
 }
 

@@ -25,7 +25,8 @@ pub(super) struct LinearContacts {
 struct Touching {
     body: BodyId,
     state: BodyState,
-    /// The sum of its contacts' wrenches.
+    /// The wrench that it had before, and with its contacts: in this order sums have the bits of those without derivatives.
+    before: Vector6<f64>,
     wrench: Vector6<f64>,
 }
 
@@ -71,8 +72,8 @@ impl LinearContacts {
         let wrench = LinearWrench::new(&found, &axes, pair.weight);
         let ends = ids.map(|id| {
             *self.places[id.index()].get_or_insert_with(|| {
-                let (state, wrench) = (states[id].value(), Vector6::zeros());
-                self.bodies.push(Touching { body: id, state, wrench });
+                let (state, before) = (states[id].value(), wrenches[id.index()].map(S::value));
+                self.bodies.push(Touching { body: id, state, before, wrench: before });
                 self.bodies.len() - 1
             })
         });
@@ -95,7 +96,7 @@ impl LinearContacts {
         // Contacts see the point of a body that has the value of its center of mass for coordinates.
         let shifted: Vec<_> =
             self.bodies.iter().map(|touching| model.shifted(touching.body, states)).collect();
-        for (Touching { body, state, wrench }, shifted) in self.bodies.iter().zip(&shifted) {
+        for (Touching { body, state, wrench, .. }, shifted) in self.bodies.iter().zip(&shifted) {
             let seen = shifted.as_ref().map_or(&states[*body], |(state, _)| state);
             let coordinates = seen.coordinates();
             let moves = !coordinates.iter().all(|x| x.is_constant());
@@ -112,10 +113,10 @@ impl LinearContacts {
         let recorded = recorded.chunks_exact(6).map(Vector6::from_column_slice);
         for ((touching, shifted), wrench) in self.bodies.iter().zip(&shifted).zip(recorded) {
             let sum = &mut wrenches[touching.body.index()];
-            *sum += wrench;
+            *sum = sum.zip_map(&touching.before, |sum, before| sum.plus(-before)) + wrench;
             if let Some((_, from_com)) = shifted {
-                let force = wrench.fixed_rows::<3>(0).into_owned();
-                *sum += spatial(&Vector3::zeros(), &from_com.cross(&force));
+                let of_contacts = |i: usize, _| wrench[i].plus(-touching.before[i]);
+                *sum += spatial(&Vector3::zeros(), &from_com.cross(&Vector3::from_fn(of_contacts)));
             }
         }
     }

@@ -103,7 +103,8 @@ impl<S: Scalar> Model<S> {
         let ids = [pair.bodies.samples, pair.bodies.field];
         if S::ORDER == 0 && law.bristles().is_none() {
             let local: [S; 6] = law.wrench(p, query).map(S::constant).into();
-            let [force, torque] = along_axes(&states[ids[1]].pose.rotation, &local, pair.weight);
+            let axes = states[ids[1]].value().pose.rotation.to_rotation_matrix();
+            let [force, torque] = weighted(&axes, &local, pair.weight);
             return Self::on_both(pair, states, force, torque);
         }
         let shifted = ids.map(|id| self.shifted(id, states));
@@ -315,10 +316,11 @@ fn along_axes<T: Scalar>(axes: &UnitQuaternion<T>, local: &[T], weight: f64) -> 
     [0, 3].map(|from| axes * Vector3::from_fn(|i, _| local[from + i].times(weight)))
 }
 
-/// Force and torque along the axes of the model, weighted, of tangents along the `axes` of a field.
+/// Force and torque along the axes of the model, weighted, of those along the constant `axes` of a field.
+#[inline]
 pub(super) fn weighted<S: Scalar>(
     axes: &Rotation3<f64>,
-    local: &[S; 12],
+    local: &[S],
     weight: f64,
 ) -> [Vector3<S>; 2] {
     let axes = axes.cast::<S>();

@@ -11,8 +11,10 @@ mod traps;
 
 use std::time::Instant;
 
-use prehend_autodiff::Fwd;
-use prehend_sim::{Adaptive, SemiImplicitEuler};
+use prehend_autodiff::{Fwd, Recording, Scalar, Var};
+use prehend_sim::{
+    Adaptive, Integrator, Model, RungeKutta4, SemiImplicitEuler, SimulationError, State, TimeSteps,
+};
 use rayon::prelude::*;
 
 use scene::Scene;
@@ -48,6 +50,74 @@ fn look(scene: &Scene) -> Findings {
         converged: converged(0.0),
         differences: [difference(scene.nudge), difference(0.5 * scene.nudge)],
         bad: scene.run(&SemiImplicitEuler, steps, 0.0_f64).map(|run| run.resolution),
+    }
+}
+
+#[test]
+fn derivatives_change_no_value() {
+    let differs = |scene: &Scene| {
+        let name = scene.name;
+        let time_steps = TimeSteps { dt: 2e-4, steps: 100 };
+        let Scene { model, start, .. } = scene;
+        let lifts = [Lift::None, Lift::Forward, Lift::Reverse];
+        let of = [
+            ("Euler", lifts.map(|lift| lift.run(&SemiImplicitEuler, model, start, time_steps))),
+            ("Runge-Kutta", lifts.map(|lift| lift.run(&RungeKutta4, model, start, time_steps))),
+            ("default", lifts.map(|lift| lift.run(&Adaptive::default(), model, start, time_steps))),
+        ];
+        of.map(|(integrator, [plain, forward, reverse])| {
+            let same = [plain == forward, plain == reverse];
+            (same != [true; 2]).then(|| format!("{name}, {integrator}: forward, reverse {same:?}"))
+        })
+    };
+    let mut scenes = scenes::all();
+    scenes.extend(scenes::turned());
+    let off: Vec<_> = scenes.par_iter().flat_map(differs).flatten().collect();
+    assert!(scenes.len() >= 30 && off.is_empty(), "{off:#?}");
+}
+
+/// Numbers with and without derivatives.
+#[derive(Clone, Copy)]
+enum Lift {
+    None,
+    Forward,
+    Reverse,
+}
+
+impl Lift {
+    /// Values of the last state, where the velocity of the last body is a variable.
+    fn run(
+        self,
+        integrator: &impl Integrator,
+        model: &Model,
+        start: &State,
+        time_steps: TimeSteps,
+    ) -> Result<State, SimulationError> {
+        fn lifted<S: Scalar>(
+            integrator: &impl Integrator,
+            model: &Model,
+            start: &State,
+            time_steps: TimeSteps,
+            zero: S,
+        ) -> Result<State, SimulationError> {
+            let mut start: State<S> = start.cast();
+            if let Some(last) = start.bodies_mut().last_mut() {
+                last.linear.x += zero;
+            }
+            let run = model.cast::<S>().simulate_with(integrator, &start, time_steps)?;
+            Ok(run.states.value())
+        }
+        match self {
+            Self::None => lifted(integrator, model, start, time_steps, 0.0),
+            Self::Forward => {
+                lifted(integrator, model, start, time_steps, Fwd::<2>::variable(0.0, 1))
+            }
+            Self::Reverse => {
+                let recording = Recording::start();
+                let [zero] = recording.variables([0.0]);
+                lifted::<Var>(integrator, model, start, time_steps, zero)
+            }
+        }
     }
 }
 

@@ -2,15 +2,16 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3, Vector6};
 use prehend_autodiff::Scalar;
 use prehend_geometry::DistanceField;
+use prehend_geometry::shapes::sphere;
 use prehend_sim::contact::{Bounce, Hertz, Stribeck, regularized_coulomb};
 use prehend_sim::fields::{HalfSpace, Sphere, SphereCavity};
 use prehend_sim::{
-    Body, BodyState, BristleFriction, ContactBodies, ContactCalibration, ContactForce,
+    Body, BodyId, BodyState, BristleFriction, ContactBodies, ContactCalibration, ContactForce,
     ContactKinematics, ContactLaw, Coulomb, DynContactLaw, GapSmoothing, HuntCrossley, KelvinVoigt,
-    Law, Model, RigidBody, State, Surface,
+    Law, Material, Model, RigidBody, Shape, State, Surface,
 };
 
 use super::parcel;
@@ -135,6 +136,54 @@ pub(crate) fn all() -> Vec<Scene> {
     all.extend(several());
     all.extend(holding());
     all
+}
+
+/// All of them, turned, fields too, and pulled at; many bodies, meshes among them.
+pub(crate) fn turned() -> Vec<Scene> {
+    let turn = UnitQuaternion::from_euler_angles(0.4, -0.3, 1.1);
+    let mut all = all();
+    for Scene { model, start, .. } in &mut all {
+        model.gravity = turn * model.gravity;
+        for state in start.bodies_mut() {
+            state.pose = turn * state.pose;
+            (state.linear, state.angular) = (turn * state.linear, turn * state.angular);
+        }
+        let wrench = Vector6::new(0.1, -0.2, 0.05, 1e-3, -2e-3, 5e-4);
+        model.bodies.iter_mut().for_each(|body| body.external_wrench = wrench);
+    }
+    for bristles in [true, false] {
+        let name = if bristles { "ten bodies with bristles" } else { "ten bodies" };
+        all.push(scene(name, many(bristles), 0.03, (Position(1, 0), Start(1, 6)), 1e-3));
+    }
+    all
+}
+
+/// Balls, boxes and meshes that fall on each other.
+fn many(bristles: bool) -> (Model, State) {
+    let mut model = Model::new(down());
+    let floor = Shape::half_space(Vector3::z_axis()).unwrap();
+    model.add(Body::fixed_from_shape("floor", &floor));
+    let shapes = [
+        Shape::ball(0.02).unwrap(),
+        Shape::cuboid([0.02, 0.015, 0.01]).unwrap(),
+        Shape::from_mesh(&sphere(0.02, 16)).unwrap(),
+    ];
+    let mut states = vec![BodyState::at_rest(Isometry3::identity())];
+    for i in 0..10 {
+        let body = Body::from_shape(&format!("body {i}"), &shapes[i % 3], 1000.0).unwrap();
+        let place = Vector3::new((i % 3) as f64, (i / 3 % 2) as f64, 1.0 + i as f64);
+        let place = place.component_mul(&Vector3::new(0.03, 0.02, 0.018));
+        let pose = Isometry3::new(place, Vector3::new(0.3 * i as f64, 0.7, -0.2));
+        states.push(body.rigid().unwrap().at_rest(&pose));
+        model.add(body);
+    }
+    if bristles {
+        model.add_contacts(Material::default()).unwrap();
+    } else {
+        let all: Vec<BodyId> = model.body_ids().collect();
+        model.add_contacts_between(&all, &all, kelvin_voigt(0.5, 1e-2), SMOOTH).unwrap();
+    }
+    (model, State::new(states))
 }
 
 /// Contacts that hold.
