@@ -4,18 +4,12 @@
 //! `target/bounce_onto_target.svg`.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use nalgebra::Vector3;
 use plotters::prelude::*;
 use prehend::autodiff::optimize::{LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
-use prehend::sim::contact::Bounce;
-use prehend::sim::fields::HalfSpace;
-use prehend::sim::{
-    Body, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Model,
-    RigidBody, SimulationError, State, Surface, TimeSteps,
-};
+use prehend::sim::prelude::*;
 
 const RADIUS: f64 = 0.03;
 /// From the throw to the hit \[s\].
@@ -25,19 +19,12 @@ const TARGET: [f64; 3] = [1.2, 0.15, 0.3];
 
 /// A rubber ball of 60 g above a floor, and where it starts.
 fn ball_and_floor() -> anyhow::Result<(Model, State)> {
-    let mass = 0.06;
-    let (rigid, surface) = (RigidBody::ball(mass, RADIUS)?, Surface::ball(RADIUS)?);
-    let contact_area = surface.area();
-    let target = ContactCalibration { mass, gravity: 9.81, penetration: 5e-5, contact_area };
-    let bounce = Bounce { restitution: 0.8, impact_speed: 3.0 };
-    let normal = HuntCrossley::from_target(&target, 1.5, bounce)?;
-    let law = Law::new(normal, Coulomb { friction: 0.4, slip_scale: 1e-2 })?;
     let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
-    let field = model.add(Body::fixed("floor").with_field(Arc::new(HalfSpace::floor())));
-    let samples = model.add(Body::dynamic("ball", rigid).with_surface(surface));
-    model.add_contact(ContactBodies { samples, field }, Arc::new(law), GapSmoothing::Hard)?;
+    model.add(Body::fixed_from_shape("floor", &Shape::half_space(Vector3::z_axis())?));
+    let ball = model.add(Body::from_shape("ball", &Shape::ball(RADIUS)?, 530.0)?);
+    model.add_contacts(Material { friction: 0.4, restitution: 0.8 })?;
     let mut start = model.neutral_state();
-    start[samples].pose.translation.z = 0.5;
+    start[ball].pose.translation.z = 0.5;
     Ok((model, start))
 }
 

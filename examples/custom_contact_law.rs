@@ -8,11 +8,7 @@ use prehend::autodiff::{Fwd, Recording, Scalar};
 use prehend::geometry::sample::surface_samples;
 use prehend::geometry::shapes;
 use prehend::sim::contact::regularized_coulomb;
-use prehend::sim::fields::HalfSpace;
-use prehend::sim::{
-    Body, ContactBodies, ContactForce, ContactKinematics, ContactLaw, GapSmoothing, Model,
-    RigidBody, SimulationError, State, Surface,
-};
+use prehend::sim::prelude::*;
 
 /// Force grows with the square of the penetration. Stiffness per area \[N/m⁴\] and friction coefficient.
 struct Quadratic([f64; 2]);

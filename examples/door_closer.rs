@@ -13,14 +13,9 @@ use nalgebra::{Isometry3, Vector3};
 use plotters::prelude::*;
 use prehend::autodiff::optimize::{Adam, Criteria};
 use prehend::autodiff::{Scalar, forward_jacobian};
-use prehend::sim::articulated::{Joint, Link};
 use prehend::sim::contact::{Bounce, Parameters};
-use prehend::sim::fields::{Cuboid, Placed};
-use prehend::sim::joint_law::{JointLaw, JointLimits, JointSpring};
-use prehend::sim::{
-    Body, BodyId, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
-    JointForceId, Law, Model, RigidBody, SimulationError, State, Surface, TimeSteps,
-};
+use prehend::sim::fields::Placed;
+use prehend::sim::prelude::*;
 
 /// Half of the door's width, thickness and height \[m\].
 const HALF: [f64; 3] = [0.4, 0.02, 1.0];

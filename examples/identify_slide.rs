@@ -20,11 +20,7 @@ use prehend::autodiff::lie::lift;
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
 use prehend::geometry::SplitMix64;
-use prehend::sim::fields::{Cuboid, HalfSpace};
-use prehend::sim::{
-    Body, BodyState, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
-    KelvinVoigt, Law, Model, Motion, RigidBody, State, Surface, TimeSteps,
-};
+use prehend::sim::prelude::*;
 
 /// Half of the edges of the parcel \[m\], and how deep it sinks into the table.
 const HALF: [f64; 3] = [0.04, 0.06, 0.03];

@@ -8,14 +8,7 @@
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
-use prehend::sim::articulated::{Joint, Link};
-use prehend::sim::contact::{BristleFriction, Coulomb, GapSmoothing, KelvinVoigt, Law};
-use prehend::sim::fields::Cuboid;
-use prehend::sim::joint_law::Motor;
-use prehend::sim::{
-    Body, BodyId, ContactBodies, JointForceId, Model, RigidBody, SemiImplicitEuler,
-    SimulationError, State, Step, TimeSteps,
-};
+use prehend::sim::prelude::*;
 
 const GRAVITY: f64 = 9.81;
 /// Steps of the simulator between two commands.

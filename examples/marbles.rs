@@ -15,10 +15,7 @@ use parry3d_f64::utils::Array2;
 use plotters::prelude::*;
 use prehend::autodiff::{Fwd, Scalar};
 use prehend::sim::contact::Bounce;
-use prehend::sim::{
-    Adaptive, Body, BodyId, BodyState, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
-    Law, Model, Shape, SimulationError, State, TimeSteps,
-};
+use prehend::sim::prelude::*;
 
 /// Radius \[m\] and density \[kg/m³\] of a marble.
 const RADIUS: f64 = 0.012;

@@ -19,10 +19,7 @@ use prehend::geometry::TriMesh;
 use prehend::geometry::shapes::{Mug, tube};
 use prehend::render::{Camera, Light, RenderModel, Renderer, RgbImage, Scene, look_at};
 use prehend::sim::contact::Bounce;
-use prehend::sim::{
-    Body, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley, Law, Model, RigidBody, Shape,
-    ShapeOptions, SimulationError, TimeSteps,
-};
+use prehend::sim::prelude::*;
 
 /// Radius of the hook's rod, and where along it the mug is to hang \[m\].
 const ROD: f64 = 4e-3;

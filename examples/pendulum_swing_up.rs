@@ -14,12 +14,8 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use prehend::autodiff::optimize::{Adam, Criteria};
 use prehend::autodiff::{Scalar, Var, gradient};
-use prehend::sim::articulated::{Joint, Link};
-use prehend::sim::joint_law::Motor;
-use prehend::sim::{
-    Adaptive, BodyId, Integrator, JointForceId, Model, RigidBody, RungeKutta4, SimulationError,
-    State, Step, TimeSteps, integrator::StepCheckpointed,
-};
+use prehend::sim::integrator::StepCheckpointed;
+use prehend::sim::prelude::*;
 
 /// Length of the rod \[m\], and mass of the ball at its end \[kg\].
 const LENGTH: f64 = 0.5;

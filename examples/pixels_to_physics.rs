@@ -13,11 +13,7 @@ use prehend::autodiff::optimize::{Adam, Criteria};
 use prehend::autodiff::{Scalar, Var, gradient};
 use prehend::geometry::{TriMesh, shapes};
 use prehend::render::{Camera, Light, RenderModel, Renderer, RgbImage, Scene, SceneVars};
-use prehend::sim::fields::HalfSpace;
-use prehend::sim::{
-    Body, BodyState, ContactBodies, Coulomb, GapSmoothing, KelvinVoigt, Law, Model, RigidBody,
-    SimulationError, Surface, TimeSteps,
-};
+use prehend::sim::prelude::*;
 
 const PICTURES: TimeSteps = TimeSteps { dt: 0.05, steps: 10 };
 const HALF: [f64; 3] = [0.04, 0.03, 0.03];

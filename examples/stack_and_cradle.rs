@@ -3,23 +3,15 @@
 //! `cargo run --release --example stack_and_cradle` draws both in `target/stack_and_cradle.svg`.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use parry3d_f64::math::Vector;
-use parry3d_f64::shape::{Ball, Cuboid, HalfSpace, RoundCuboid};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use prehend::autodiff::{Fwd, Scalar};
-use prehend::sim::contact::Bounce;
-use prehend::sim::{
-    Body, BodyId, BodyState, BristleFriction, ContactCalibration, Coulomb, GapSmoothing,
-    HuntCrossley, KelvinVoigt, Law, Model, Shape, SimulationError, State, TimeSteps,
-};
+use prehend::sim::prelude::*;
 
-/// Half of a box's edge without, and the radius of, the rounding \[m\].
-const HALF: f64 = 0.027;
-const ROUNDING: f64 = 3e-3;
+/// Half of a box's edge \[m\].
+const HALF: f64 = 0.03;
 /// Radius of a steel ball and the gap to the next \[m\], how many there are, and how fast the first one comes \[m/s\].
 const RADIUS: f64 = 0.02;
 const GAP: f64 = 5e-4;
@@ -29,47 +21,31 @@ const SPEED: f64 = 1.0;
 /// Three boxes that fall, a little turned, onto each other; z up.
 fn stack() -> anyhow::Result<(Model, State)> {
     let mut model = Model::new(Vector3::z() * -9.81);
-    let floor = Shape::from_parry(&HalfSpace::new(Vector::Z))?;
-    let floor = model.add(Body::fixed_from_shape("floor", &floor));
-    let inner_shape = Cuboid::new(Vector::splat(HALF));
-    let shape = Shape::from_parry(&RoundCuboid { inner_shape, border_radius: ROUNDING })?;
+    model.add(Body::fixed_from_shape("floor", &Shape::half_space(Vector3::z_axis())?));
+    let shape = Shape::cuboid([HALF; 3])?;
     let mut states = vec![BodyState::at_rest(Isometry3::identity())];
-    let mut boxes: Vec<BodyId> = Vec::new();
     for level in 0..3 {
-        let height = (2 * level + 1) as f64 * (HALF + ROUNDING) + 1e-3 * (level + 1) as f64;
+        let height = (2 * level + 1) as f64 * HALF + 1e-3 * (level + 1) as f64;
         let turn = Vector3::new(0.02, -0.015, 0.15) * level as f64;
         states.push(BodyState::at_rest(Isometry3::new(Vector3::new(0.0, 0.0, height), turn)));
-        boxes.push(model.add(Body::from_shape(&format!("box {level}"), &shape, 700.0)?));
+        model.add(Body::from_shape(&format!("box {level}"), &shape, 700.0)?);
     }
-    // 20 µm deep under a box, and critically damped.
-    let normal = KelvinVoigt { stiffness: 2.5e7, damping: 7e4 };
-    let friction = Coulomb { friction: 0.5, slip_scale: 1e-2 };
-    let law = Arc::new(Law::new(normal, BristleFriction { friction, deflection: 1e-4 })?);
-    let smoothing = GapSmoothing::Softplus { width: 5e-6 };
-    model.add_contacts_between(&boxes, &[floor], law.clone(), smoothing)?;
-    model.add_contacts_between(&boxes, &boxes, law, smoothing)?;
+    model.add_contacts(Material::default())?;
     Ok((model, State::new(states)))
 }
 
 /// Steel balls in a row along x, weightless, the first of them a little apart.
 fn cradle() -> anyhow::Result<(Model, State)> {
     let mut model = Model::new(Vector3::zeros());
-    let shape = Shape::from_parry(&Ball::new(RADIUS))?;
-    let mut balls: Vec<BodyId> = Vec::new();
+    let shape = Shape::ball(RADIUS)?;
     let mut states = Vec::new();
     for i in 0..BALLS {
         let apart = if i == 0 { -0.1 } else { 0.0 };
         let x = i as f64 * (2.0 * RADIUS + GAP) + apart;
         states.push(BodyState::at_rest(Isometry3::translation(x, 0.0, 0.0)));
-        balls.push(model.add(Body::from_shape(&format!("ball {i}"), &shape, 7800.0)?));
+        model.add(Body::from_shape(&format!("ball {i}"), &shape, 7800.0)?);
     }
-    let mass = model.bodies[balls[0]].rigid().map_or(0.0, |rigid| rigid.mass());
-    let contact_area = std::f64::consts::PI * RADIUS * RADIUS;
-    let target = ContactCalibration { mass, gravity: 9.81, penetration: 1e-7, contact_area };
-    let bounce = Bounce { restitution: 0.98, impact_speed: 0.5 };
-    let normal = HuntCrossley::from_target(&target, 1.0, bounce)?;
-    let law = Law::new(normal, Coulomb { friction: 0.1, slip_scale: 1e-2 })?;
-    model.add_contacts_between(&balls, &balls, Arc::new(law), GapSmoothing::Hard)?;
+    model.add_contacts(Material { friction: 0.1, restitution: 0.98 })?;
     Ok((model, State::new(states)))
 }
 
@@ -135,13 +111,12 @@ where
         .y_label_area_size(48)
         .build_cartesian_2d(-0.1..0.1, 0.0..0.22)?;
     chart.configure_mesh().disable_mesh().x_desc("x [m]").y_desc("height [m]").draw()?;
-    let half = HALF + ROUNDING;
     for (states, color) in
         moments.into_iter().zip([RGBColor(170, 170, 170), RGBColor(31, 119, 180)])
     {
         for state in &states.bodies()[1..4] {
             let corner = |x: f64, y: f64, z: f64| {
-                let p = state.pose * Point3::new(half * x, half * y, half * z);
+                let p = state.pose * Point3::new(HALF * x, HALF * y, HALF * z);
                 (p.x, p.z)
             };
             for y in [-1.0, 1.0] {

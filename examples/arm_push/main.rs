@@ -14,10 +14,8 @@ use std::path::Path;
 use nalgebra::Vector2;
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Scalar, Var, jacobian};
-use prehend::sim::{
-    Adaptive, Integrator, Model, SemiImplicitEuler, SimulationError, State, Step, TimeSteps,
-    integrator::StepCheckpointed,
-};
+use prehend::sim::integrator::StepCheckpointed;
+use prehend::sim::prelude::*;
 use scene::Scene;
 
 /// Angles of the plan besides the first, and the time from one to the next \[s\].

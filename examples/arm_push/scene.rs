@@ -3,14 +3,8 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use prehend::sim::articulated::{Joint, Link};
 use prehend::sim::contact::Bounce;
-use prehend::sim::fields::{Cuboid, HalfSpace};
-use prehend::sim::joint_law::PositionServo;
-use prehend::sim::{
-    Body, BodyId, ContactBodies, ContactCalibration, Coulomb, GapSmoothing, HuntCrossley,
-    JointForceId, Law, Model, RigidBody, State, Surface,
-};
+use prehend::sim::prelude::*;
 
 /// Lengths of upper arm and forearm, and the height at which they turn above the table \[m\].
 pub(crate) const LINKS: [f64; 2] = [0.3, 0.25];

@@ -6,11 +6,8 @@ use anyhow::Context;
 use nalgebra::{Isometry3, Point3, Vector3};
 use prehend::geometry::mjcf::Model as MjcfModel;
 use prehend::geometry::robot::{KinematicTree, RobotShape};
-use prehend::sim::articulated::Joint;
 use prehend::sim::contact::LawError;
-use prehend::sim::joint_law::PositionServo;
-use prehend::sim::robot::{MjcfOptions, UrdfOptions};
-use prehend::sim::{BodyId, JointForceId, Model};
+use prehend::sim::prelude::*;
 
 /// Two fingers that slide towards each other under a plate.
 const URDF: &str = r#"<robot name="slides">

@@ -10,11 +10,7 @@ mod hull;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
-use prehend::sim::fields::{Cuboid, HalfSpace};
-use prehend::sim::{
-    Adaptive, Body, BristleFriction, ContactBodies, ContactCalibration, Coulomb, DynContactLaw,
-    GapSmoothing, KelvinVoigt, Law, Model, RigidBody, SimulationError, State, Step, TimeSteps,
-};
+use prehend::sim::prelude::*;
 
 use gripper::Gripper;
 

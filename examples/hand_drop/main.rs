@@ -14,12 +14,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use prehend::geometry::hand::{ALLEGRO_XELA_URDF, default_grasp};
 use prehend::geometry::robot::{KinematicTree, RobotShape};
 use prehend::sim::contact::Bounce;
-use prehend::sim::joint_law::PositionServo;
-use prehend::sim::robot::UrdfOptions;
-use prehend::sim::{
-    Body, BodyId, ContactBodies, ContactCalibration, Coulomb, DynContactLaw, GapSmoothing,
-    HuntCrossley, Law, Model, RigidBody, State, Surface, TimeSteps,
-};
+use prehend::sim::prelude::*;
 
 /// The ball: radius \[m\], mass \[kg\], and how high over the base of the hand it starts \[m\].
 const RADIUS: f64 = 0.03;

@@ -3,11 +3,7 @@
 use std::sync::Arc;
 
 use prehend::nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-use prehend::sim::fields::HalfSpace;
-use prehend::sim::{
-    Adaptive, Body, BodyState, BuildError, ContactBodies, DynContactLaw, GapSmoothing, Integrator,
-    Model, RigidBody, SemiImplicitEuler, SimulationError, State, Step, Surface, TimeSteps,
-};
+use prehend::sim::prelude::*;
 
 use super::curves::Curve;
 use super::finding::{Finding, Verdict};

@@ -4,11 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use prehend::autodiff::Scalar;
-use prehend::sim::fields::HalfSpace;
-use prehend::sim::{
-    Body, BuildError, ContactBodies, GapSmoothing, Integrator, Model, Motion, RigidBody,
-    SimulationError, State, Surface, TimeSteps,
-};
+use prehend::sim::prelude::*;
 
 use super::law::CubeLaw;
 use super::parameters::COUNT;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Rotation3, SVector, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Rotation3, SVector, Vector3, Vector6};
 use prehend_autodiff::{Fwd, Scalar};
 
 use super::Model;
@@ -307,13 +307,8 @@ pub(super) fn bristle_wrench<T: Scalar>(
             T::local(function, std::array::from_fn::<T, 21, _>(change))
         }
     };
-    (along_axes(axes, &local, weight), Vector6::from_column_slice(&local[6..]))
-}
-
-/// Force and torque along the axes of the model, weighted, of those along the `axes` of a field.
-#[inline]
-fn along_axes<T: Scalar>(axes: &UnitQuaternion<T>, local: &[T], weight: f64) -> [Vector3<T>; 2] {
-    [0, 3].map(|from| axes * Vector3::from_fn(|i, _| local[from + i].times(weight)))
+    let part = |from: usize| axes * Vector3::from_fn(|i, _| local[from + i].times(weight));
+    ([part(0), part(3)], Vector6::from_column_slice(&local[6..]))
 }
 
 /// Force and torque along the axes of the model, weighted, of those along the constant `axes` of a field.
