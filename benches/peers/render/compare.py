@@ -49,8 +49,9 @@ class Peer:
 
 def peers(options):
     cargo = ["cargo", "run", "--release", "--quiet", "--manifest-path", "../Cargo.toml", "--bin", "render", "--"]
-    yield Peer("ours, contour", cargo + ["contour"])
-    yield Peer("ours, SoftRas, 50 faces a pixel", cargo + ["softras"])
+    yield Peer("ours, contour, 1 sample a pixel", cargo + ["contour", "1"])
+    yield Peer("ours, contour, 16 samples", cargo + ["contour", "4"])
+    yield Peer("ours, SoftRas, 50 faces a pixel", cargo + ["softras", "1"])
     yield Peer("DEODR", [sys.executable, "deodr_peer.py"])
     for samples in (1, 4):
         name = f"Mitsuba 3, {samples} sample{'s' if samples > 1 else ''}"

@@ -27,7 +27,7 @@ pub struct ContourOptions {
     pub half_width: f64,
     /// Where the color of the surface jumps — at edges with separate normals, and at seams of its texture or its vertex
     /// colors — a pixel within the band shows some of both sides, so that the jump has a derivative.
-    /// Graphics devices do not support it.
+    /// For one sample a pixel only: with more, jumps count in any case. Graphics devices do not support it.
     pub creases: bool,
 }
 

@@ -1,6 +1,6 @@
 //! Ours among the peers: answers what `compare.py` asks, a line of JSON each.
 //!
-//! The argument says how to render: `contour` or `softras`.
+//! The argument says how to render: `contour 1` and `contour 4` (samples a pixel, across and down), or `softras 1`.
 
 mod reference;
 mod scene;
@@ -20,14 +20,16 @@ use serde_json::{Value, json};
 const HALF_WIDTH: f64 = 0.645;
 
 fn main() -> anyhow::Result<()> {
-    let mode = match std::env::args().nth(1).as_deref() {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let mode = match words.first().map(String::as_str) {
         Some("contour") => {
             Mode::Contour(ContourOptions { half_width: HALF_WIDTH, ..ContourOptions::default() })
         }
         Some("softras") => Mode::SoftRas(SoftRasOptions::default()),
-        _ => bail!("give a mode, contour or softras"),
+        _ => bail!("give a mode, contour or softras, and the samples a pixel"),
     };
-    let loss = PoseLoss::new(mode, LossOptions::default());
+    let samples = words.get(1).context("the samples a pixel")?.parse()?;
+    let loss = PoseLoss::new(mode, LossOptions::default()).with_samples(samples);
     let (mut scene, mut target) = (None, None);
     for line in std::io::stdin().lock().lines() {
         let request: Value = serde_json::from_str(&line?)?;

@@ -4,7 +4,6 @@ use glam::Vec2;
 
 use super::outline::{Foot, Piece};
 use super::scene::ContourScene;
-use super::step::falling_step;
 use crate::model::{Edge, NONE};
 use crate::projected::{Projected, Region, edge_functions};
 use crate::raster::{SeenFace, Visible};
@@ -105,7 +104,8 @@ impl ContourScene<'_> {
         let (here, beyond) = if side < 0.0 { (here, beyond) } else { (beyond, here) };
         let here = self.at_foot::<DERIVATIVES>(&here, &foot);
         let beyond = self.at_foot::<DERIVATIVES>(&beyond, &foot);
-        let (share, slope) = falling_step(foot.distance_squared.sqrt(), self.half_width);
+        let step = self.drawing.step;
+        let (share, slope) = step.at(foot.distance_squared.sqrt(), crease.piece.outward);
         let jump = [0, 1, 2].map(|k| beyond.color[k] - here.color[k]);
         own.color.iter_mut().zip(jump).for_each(|(color, jump)| *color += share * jump);
         if DERIVATIVES {

@@ -2,9 +2,10 @@
 
 use glam::Vec2;
 
+use super::drawing::falling_step;
+use super::footprint::Layers;
 use super::inner::Inner;
 use super::scene::ContourScene;
-use super::step::falling_step;
 use crate::view::{Pixel, scaled_sum};
 
 impl ContourScene<'_> {
@@ -17,6 +18,7 @@ impl ContourScene<'_> {
         at: Vec2,
         own: Pixel,
         inner: &Inner,
+        layers: Option<&Layers>,
     ) -> Pixel {
         let foot = inner.piece.foot(at);
         let side = if own.z > inner.split { 1.0 } else { -1.0 };
@@ -24,13 +26,13 @@ impl ContourScene<'_> {
             (self.at_foot::<DERIVATIVES>(&inner.piece, &foot), own)
         } else {
             let (beyond, face, inverse_z) = inner.behind;
-            (own, self.interior::<DERIVATIVES>(beyond, face, inverse_z))
+            (own, self.interior::<DERIVATIVES>(beyond, face, inverse_z, None))
         };
         let distance = foot.distance_squared.sqrt();
-        let w = self.half_width;
-        let (alpha, slope) = falling_step(side * distance, w);
+        let step = self.drawing.step;
+        let (alpha, slope) = step.at(side * distance, inner.piece.outward);
         // Depth counts for nothing at the step itself.
-        let (weight, weight_derivative) = falling_step(w - 2.0 * distance, w);
+        let (weight, weight_derivative) = falling_step(step.reach() - 2.0 * distance, step.reach());
         let mut out = own;
         for k in 0..3 {
             out.color[k] = alpha * near.color[k] + (1.0 - alpha) * far.color[k];
@@ -42,6 +44,9 @@ impl ContourScene<'_> {
                 let mixed = scaled_sum(alpha, &near.color_rows[k], 1.0 - alpha, &far.color_rows[k]);
                 let step = slope * (near.color[k] - far.color[k]);
                 out.color_rows[k] = scaled_sum(1.0, &mixed, step, &ds);
+            }
+            if let Some(layers) = layers {
+                out.color_rows = self.rows_across(at, inner, &foot, side, layers, &ds);
             }
             out.depth_weight_row = ds.map(|v| -2.0 * side * weight_derivative * v);
         }

@@ -2,11 +2,12 @@
 
 use glam::{Vec2, Vec3};
 
+use super::drawing::{DrawStep, falling_step};
+use super::footprint::{Around, Beside, Cut};
 use super::interior::{InteriorMotion, add_level, row};
 use super::near::Near;
 use super::outline::{Foot, Piece};
 use super::scene::ContourScene;
-use super::step::falling_step;
 use crate::projected::barycentric;
 use crate::shading::surface::{Shaded, shade};
 use crate::view::{Pixel, Row, scaled_sum};
@@ -20,39 +21,58 @@ impl ContourScene<'_> {
         face: u32,
         inverse_z: f32,
         Near { edge, inner, crease }: Near,
+        beside: Option<&Beside>,
     ) -> Pixel {
-        let mut pixel = self.interior::<DERIVATIVES>(at, face, inverse_z);
+        let (around, layers) = match beside {
+            Some(Beside::Surface(around)) => (Some(around), None),
+            Some(Beside::Layers(layers)) => (None, Some(layers)),
+            None => (None, None),
+        };
+        // Of a pixel through which a contour runs only a part counts, whose rows come below.
+        let cut = around.filter(|_| inner.is_none() && edge.is_some());
+        let cut = cut.filter(|_| self.drawing.step == DrawStep::Square);
+        let whole = around.filter(|_| cut.is_none());
+        let mut pixel = self.interior::<DERIVATIVES>(at, face, inverse_z, whole);
         if let Some(crease) = crease {
             self.soften::<DERIVATIVES>(at, inverse_z, &mut pixel, crease);
         }
         if let Some(inner) = inner {
-            pixel = self.cross::<DERIVATIVES>(at, pixel, inner);
+            pixel = self.cross::<DERIVATIVES>(at, pixel, inner, layers);
         }
         if let Some(piece) = edge {
             let foot = piece.foot(at);
-            self.blend::<DERIVATIVES>(piece, &foot, -1.0, &mut pixel);
+            let cut = cut.map(|around| (face, around));
+            self.blend::<DERIVATIVES>(at, piece, &foot, -1.0, cut, &mut pixel);
         }
         pixel
     }
 
     /// The pixel `at` that no face covers, next to the outline: it shows the color of the nearest outline point.
     #[inline]
-    pub(super) fn outside<const DERIVATIVES: bool>(&self, at: Vec2, piece: &Piece) -> Pixel {
+    pub(super) fn outside<const DERIVATIVES: bool>(
+        &self,
+        at: Vec2,
+        piece: &Piece,
+        around: Option<&Around>,
+    ) -> Pixel {
         let foot = piece.foot(at);
         let mut pixel = self.at_foot::<DERIVATIVES>(piece, &foot);
-        self.blend::<DERIVATIVES>(piece, &foot, 1.0, &mut pixel);
+        let cut = around.filter(|_| self.drawing.step == DrawStep::Square);
+        let cut = cut.map(|around| (piece.face, around));
+        self.blend::<DERIVATIVES>(at, piece, &foot, 1.0, cut, &mut pixel);
         pixel
     }
 
-    /// The unblended pixel `at` of a face. Its rows are those at its center.
+    /// The unblended pixel `at` of a face. Its rows are those at its center, or over its area if what is `around` is given.
     #[inline]
     pub(super) fn interior<const DERIVATIVES: bool>(
         &self,
         at: Vec2,
         face: u32,
         inverse_z: f32,
+        around: Option<&Around>,
     ) -> Pixel {
-        let face = face as usize;
+        let (index, face) = (face, face as usize);
         let b = barycentric(self.posed.projected.corners(face), at);
         let shaded = shade::<DERIVATIVES>(&self.posed, &self.lighting, face, b);
         let z = 1.0 / inverse_z;
@@ -69,6 +89,9 @@ impl ContourScene<'_> {
                 add_level(&mut pixel.color_rows[k], level, arm);
             }
             pixel.z_row = motion.z_row;
+            if let Some(around) = around {
+                pixel.color_rows = self.rows_over_footprint(at, z, index, around, &shaded, None);
+            }
         }
         pixel
     }
@@ -112,15 +135,18 @@ impl ContourScene<'_> {
     #[inline]
     fn blend<const DERIVATIVES: bool>(
         &self,
+        at: Vec2,
         piece: &Piece,
         foot: &Foot,
         side: f32,
+        cut: Option<(u32, &Around)>,
         pixel: &mut Pixel,
     ) {
         let distance = foot.distance_squared.sqrt();
         let s = side * distance;
-        let w = self.half_width;
-        let (alpha, slope) = falling_step(s, w);
+        let step = self.drawing.step;
+        let (alpha, slope) = step.at(s, piece.outward);
+        let w = step.reach();
         // The same step, compressed to the inner half of the band.
         let (outer, outer_slope) = falling_step(2.0 * s + w, w);
         let color = pixel.color;
@@ -132,8 +158,20 @@ impl ContourScene<'_> {
             return;
         }
         let ds = self.distance_row(piece, foot, side);
-        for (rows, c) in pixel.color_rows.iter_mut().zip(color) {
-            *rows = scaled_sum(alpha, rows, slope * c, &ds);
+        let mut edge = color;
+        match cut {
+            Some((face, around)) => {
+                let (b, point, _) = self.on_edge(piece, foot.t);
+                let shaded = shade::<true>(&self.posed, &self.lighting, piece.face as usize, b);
+                edge = shaded.color;
+                let cut = Cut { distance: s, outward: piece.outward, color: edge };
+                pixel.color_rows =
+                    self.rows_over_footprint(at, point.z, face, around, &shaded, Some(&cut));
+            }
+            _ => pixel.color_rows.iter_mut().for_each(|rows| *rows = rows.map(|v| alpha * v)),
+        }
+        for (rows, c) in pixel.color_rows.iter_mut().zip(edge) {
+            *rows = scaled_sum(1.0, rows, slope * c, &ds);
         }
         pixel.coverage_row = ds.map(|v| slope * v);
         pixel.depth_weight_row =

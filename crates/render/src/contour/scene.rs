@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::drawing::Drawing;
 use crate::posed::Posed;
 use crate::shading::surface::PosedLight;
 
@@ -9,8 +10,7 @@ use crate::shading::surface::PosedLight;
 pub(crate) struct ContourScene<'a> {
     pub(crate) posed: Posed<'a>,
     pub(crate) lighting: PosedLight,
-    /// Half-width of the band across contours \[px\].
-    pub(crate) half_width: f32,
+    pub(crate) drawing: Drawing,
     pub(crate) twist_center: Vec3,
 }
 

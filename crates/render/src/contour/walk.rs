@@ -83,8 +83,8 @@ impl<'a, const DERIVATIVES: bool, S: Sink<DERIVATIVES>> Walk<'a, DERIVATIVES, S>
         for column in columns {
             let x = left + column;
             let at = self.in_image(x, y);
-            let found = self.bands.found(x, y);
-            let Some(seen) = self.view.seen::<DERIVATIVES>(x, y, found) else {
+            let (place, found) = self.bands.found(x, y);
+            let Some(seen) = self.view.seen::<DERIVATIVES>(place, found) else {
                 self.sink.nothing(at);
                 continue;
             };

@@ -1,7 +1,7 @@
 //! Which settings of a loss make sense.
 
-use super::PoseLoss;
 use super::options::LossOptions;
+use super::{MOST_SAMPLES, PoseLoss};
 use crate::mode::{ContourOptions, Mode, SoftRasOptions};
 
 /// A setting out of its range.
@@ -44,6 +44,8 @@ impl PoseLoss {
     /// # Errors
     /// Names the first setting that is not.
     pub fn check(&self) -> Result<(), OptionError> {
+        let few = (1..=MOST_SAMPLES).contains(&self.samples);
+        check("samples", self.samples as f64, "1 to 16", few)?;
         match &self.mode {
             Mode::Contour(options) => {
                 let w = options.half_width;
@@ -130,6 +132,7 @@ mod tests {
         assert_eq!(of(|o| o.faces_per_pixel = 100), "faces_per_pixel");
         assert_eq!(of(|o| o.z_near = 200.0), "z_far");
         assert_eq!((of(|o| o.sigma = 0.0), of(|o| o.gamma = -1.0)), ("sigma", "gamma"));
+        assert_eq!(PoseLoss::default().with_samples(0).check().unwrap_err().name, "samples");
         let error = PoseLoss::new(soft, nan).check().unwrap_err();
         assert_eq!(error.to_string(), "color_weight is NaN, expected a number from 0 to 1e12");
     }

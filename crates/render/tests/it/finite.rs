@@ -161,8 +161,8 @@ proptest! {
     #![proptest_config(config(4000))]
 
     #[test]
-    fn losses_of_poses(camera in cameras(), mesh in bodies(), (size, pose) in places(), mode in modes(), options in options(), seen in [0..2_u8, 0..3_u8, 0..3_u8]) {
-        let loss = PoseLoss::new(mode, options);
+    fn losses_of_poses(camera in cameras(), mesh in bodies(), (size, pose) in places(), mode in modes(), options in options(), seen in [0..2_u8, 0..3_u8, 0..3_u8], samples in select(vec![1, 1, 2])) {
+        let loss = PoseLoss::new(mode, options).with_samples(samples);
         let Ok(model) = RenderModel::new(&mesh.scaled(size)) else { return Ok(()) };
         if loss.check().is_err() { return Ok(()) }
         let light = Light::headlight(0.5, 0.5);

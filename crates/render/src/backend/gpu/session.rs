@@ -38,6 +38,9 @@ impl GpuSession {
             let device = device.name.clone();
             BackendError::Unsupported { device, what }
         };
+        if problem.loss.samples > 1 {
+            return Err(unsupported("more than one sample a pixel"));
+        }
         if matches!(problem.loss.mode, Mode::Contour(options) if options.creases) {
             return Err(unsupported("creases that blend"));
         }

@@ -212,12 +212,14 @@ fn results_do_not_depend_on_the_number_of_threads() {
     let truth = pose(&mut Noise(8));
     let target = target_of(&model, &truth, &lamp(), None, 0.5);
     let guess = twisted(&truth, &Point3::origin(), &[0.002, 0.001, -0.003, 0.01, -0.01, 0.01]);
-    let loss = PoseLoss::new(Mode::default(), full_options());
-    let run = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| loss.linearize(&model, &guess, &Point3::origin(), &lamp(), &target))
-    };
-    assert_eq!(run(1), run(4));
+    let plain = PoseLoss::new(Mode::default(), full_options());
+    for loss in [plain, plain.with_samples(2)] {
+        let run = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| loss.linearize(&model, &guess, &Point3::origin(), &lamp(), &target))
+        };
+        assert_eq!(run(1), run(4));
+    }
 }
 
 #[test]

@@ -40,9 +40,9 @@ fn is_the_same_as_pixel_by_pixel() {
         for penalize_occluded in [false, true] {
             let options = LossOptions { penalize_occluded, ..full_options() };
             let residuals = Residuals { options: &options, target: &target };
-            let contour = ContourOptions { creases: crease, ..Default::default() };
+            let drawing = ContourOptions { creases: crease, ..Default::default() }.drawing(1);
             let (camera, bounds) = (&target.camera, &target.bounds);
-            let view = ContourView::new(&contour, &model, &guess, &center, camera, &lamp(), bounds);
+            let view = ContourView::new(drawing, &model, &guess, &center, camera, &lamp(), bounds);
             let quick = Sums::total(&residuals.by_tiles::<true>(&view, Tiling::WHOLE));
             let slow = {
                 let tiles = residuals.by_tiles::<true>(&PixelByPixel(view), Tiling::WHOLE);

@@ -20,14 +20,15 @@ fn pixels<const D: bool>(
 ) -> Vec<Option<Sample>> {
     let camera = camera();
     let options = ContourOptions::default();
-    let view = ContourView::new(&options, model, pose, center, &camera, light, &Region::EMPTY);
+    let view =
+        ContourView::new(options.drawing(1), model, pose, center, &camera, light, &Region::EMPTY);
     let mut out = vec![None; camera.width * camera.height];
     for (index, visible) in view.visible.iter().enumerate() {
         view.visit::<D>(index, |x, y, seen| {
             out[y * camera.width + x] =
                 seen.map(|s| Sample { hit: s.hit, face: 0, pixel: s.pixel });
         });
-        let band = Band::new(view.pieces.iter(), &visible.region, view.scene.half_width);
+        let band = Band::new(view.pieces.iter(), &visible.region, view.scene.drawing.step.reach());
         for (i, &face) in visible.face.iter().enumerate() {
             let (x, y) = visible.position(i);
             if let Some(sample) = &mut out[y * camera.width + x] {
