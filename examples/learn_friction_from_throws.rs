@@ -5,14 +5,19 @@
 //!
 //! `cargo run --release --example learn_friction_from_throws` draws what was simulated over what was seen in `target/learn_friction_from_throws.svg`.
 
+use std::f64::consts::PI;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use nalgebra::{Isometry3, Vector3};
+use parry3d_f64::math::Vector;
+use parry3d_f64::shape::{Ball, HalfSpace};
 use plotters::prelude::*;
 use prehend::autodiff::optimize::{LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
 use prehend::geometry::SplitMix64;
+use prehend::sim::contact::Bounce;
 use prehend::sim::prelude::*;
 
 const THROWS: usize = 1024;
@@ -29,16 +34,24 @@ const TIME_STEPS: TimeSteps = TimeSteps { dt: 0.4, steps: 1 };
 /// A ball on a floor, y up.
 fn model() -> anyhow::Result<Model> {
     let mut model = Model::new(Vector3::y() * -9.81);
-    model.add(Body::fixed_from_shape("floor", &Shape::half_space(Vector3::y_axis())?));
-    model.add(Body::from_shape("ball", &Shape::ball(RADIUS)?, DENSITY)?);
-    model.add_contacts(Material { friction: GUESS, restitution: 0.3 })?;
+    let floor = Shape::from_parry(&HalfSpace::new(Vector::Y))?;
+    let floor = model.add(Body::fixed_from_shape("floor", &floor));
+    let ball = Body::from_shape("ball", &Shape::from_parry(&Ball::new(RADIUS))?, DENSITY)?;
+    let mass = DENSITY * 4.0 / 3.0 * PI * RADIUS.powi(3);
+    let contact_area = PI * RADIUS * RADIUS;
+    let ball = model.add(ball);
+    let target = ContactCalibration { mass, gravity: 9.81, penetration: 5e-4, contact_area };
+    let normal =
+        HuntCrossley::from_target(&target, 1.0, Bounce { restitution: 0.3, impact_speed: 0.5 })?;
+    let law = Law::new(normal, Coulomb { friction: GUESS, slip_scale: 2e-2 })?;
+    model.add_contacts_between(&[ball], &[floor], Arc::new(law), GapSmoothing::Hard)?;
     Ok(model)
 }
 
 /// How the ball is thrown: it slides on, for it spins backwards and aside.
 fn throw(random: &mut SplitMix64) -> BodyState {
     let mut number = || 2.0 * random.uniform() - 1.0;
-    let mut state = BodyState::at_rest(Isometry3::translation(0.0, RADIUS, 0.0));
+    let mut state = BodyState::at_rest(Isometry3::translation(0.0, RADIUS - 5e-4, 0.0));
     state.linear = Vector3::new(1.2 + 0.3 * number(), 0.0, 0.2 * number());
     state.angular = Vector3::new(20.0 * number(), 0.0, 40.0 + 15.0 * number());
     state
@@ -52,8 +65,8 @@ fn ends<S: Scalar>(
     friction: S,
 ) -> Result<Vec<[S; 2]>, SimulationError> {
     let mut model = model.cast::<S>();
-    for contact in &mut model.contacts {
-        *contact.param_mut("friction")? = friction;
+    for group in &mut model.contact_groups {
+        *group.contact.param_mut("friction")? = friction;
     }
     let floor = BodyState::at_rest(Isometry3::identity());
     let start = |throw: &BodyState| (model.clone(), State::new([floor, *throw]).cast());
