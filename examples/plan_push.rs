@@ -8,15 +8,17 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point2, Rotation2, Vector2, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Rotation2, Vector2, Vector3};
 use plotters::prelude::*;
 use prehend::autodiff::optimize::{Criteria, LevenbergMarquardt, NormalEquations};
 use prehend::autodiff::{Fwd, Scalar};
+use prehend::sim::contact::Bounce;
 use prehend::sim::model::Trajectory;
 use prehend::sim::prelude::*;
 
-/// Half of the edges of the box \[m\].
+/// Half of the edges of the box, and how deep it sinks into the table \[m\].
 const HALF: [f64; 3] = [0.05, 0.04, 0.03];
+const DEPTH: f64 = 2e-4;
 /// Radius of the finger \[m\].
 const FINGER: f64 = 0.012;
 /// x and y \[m\] and yaw \[rad\] in which the box is to end, from zero.
@@ -59,14 +61,37 @@ fn spline<S: Scalar>(points: Vec<Vector2<S>>) -> impl Trajectory<S> {
 
 /// A box of 500 g on a table, the finger, and where they are at the start.
 fn scene() -> anyhow::Result<(Model, State)> {
-    let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
-    model.add(Body::fixed_from_shape("table", &Shape::half_space(Vector3::z_axis())?));
-    let pushed = model.add(Body::from_shape("box", &Shape::cuboid(HALF)?, 1040.0)?);
+    let mass = 0.5;
+    let rigid = RigidBody::cuboid(mass, HALF)?;
+    // One sample in the middle of each square of 2 cm.
+    let row = |i| (0..4).map(move |j| Point3::new(0.02 * i, 0.02 * f64::from(j) - 0.03, -HALF[2]));
+    let bottom: Vec<_> = (-2..=2).flat_map(|i| row(f64::from(i))).collect();
+    let area = 4.0 * HALF[0] * HALF[1];
+    let sides = Cuboid { half_extents: HALF.into(), rounding: 2e-3 };
+    let pushed = Body::dynamic("box", rigid).with_field(Arc::new(sides));
+    let tip = Surface::ball(FINGER)?;
+    let tip_area = tip.area();
     let still = BodyState::at_rest(Isometry3::identity());
-    model.add(Body::kinematic("finger", move |_: f64| still).with_surface(Surface::ball(FINGER)?));
-    model.add_contacts(Material { friction: 0.35, ..Material::default() })?;
+    let mut model = Model::new(Vector3::new(0.0, 0.0, -9.81));
+    let table = model.add(Body::fixed("table").with_field(Arc::new(HalfSpace::floor())));
+    let pushed = model.add(pushed.with_surface(Surface::uniform(&bottom, area)?));
+    let finger = model.add(Body::kinematic("finger", move |_: f64| still).with_surface(tip));
+
+    let friction = Coulomb { friction: 0.35, slip_scale: 5e-3 };
+    let normal = |penetration: f64, contact_area: f64| {
+        let target = ContactCalibration { mass, gravity: 9.81, penetration, contact_area };
+        let bounce = Bounce { restitution: 0.2, impact_speed: 0.1 };
+        HuntCrossley::from_target(&target, 1.0, bounce)
+    };
+    let law = Law::new(normal(DEPTH, area)?, friction)?;
+    let bodies = ContactBodies { samples: pushed, field: table };
+    model.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
+    // The finger must not creep along the box in the seconds of the push.
+    let law = Law::new(normal(5e-4, tip_area)?, BristleFriction { friction, deflection: 5e-4 })?;
+    let bodies = ContactBodies { samples: finger, field: pushed };
+    model.add_contact(bodies, Arc::new(law), GapSmoothing::Hard)?;
     let mut start = model.neutral_state();
-    start[pushed].pose.translation.z = HALF[2];
+    start[pushed].pose.translation.z = HALF[2] - DEPTH;
     Ok((model, start))
 }
 
